@@ -66,7 +66,7 @@ def both(shape: str, threads: int = 1) -> tuple[EnergeticBlocks, CompressedBlock
 def expanded(short: CompressedBlocks) -> EnergeticBlocks:
     """Dense blocks from compressed ones."""
     matrices = (
-        np.array(kind).real for kind in zip(*short.combined(np.eye(short.steps)), strict=True)
+        np.array(kind).real for kind in zip(*short.combine(np.eye(short.steps)), strict=True)
     )
     return EnergeticBlocks(short.mesh, short.c_p, short.c_s, short.dt, *matrices)
 
@@ -246,7 +246,7 @@ def test_missed_equations(monkeypatch):
     """An answer that misses the equations of the march is refused."""
     free = problem(both("disk")[1], symmetric=True, held=False)
     monkeypatch.setattr(
-        "vi_contact.bem.frequency_circle.CompressedBlocks.applied",
+        "vi_contact.bem.frequency_circle.CompressedBlocks.apply",
         lambda self, p, u, jumps: [0.0 * p[0], p[0], u[0], u[0]],
     )
     with pytest.raises(

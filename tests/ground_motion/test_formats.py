@@ -5,7 +5,7 @@ import hashlib
 
 import numpy as np
 import pytest
-from record_files import AFAD, COUNTS, VALUES, cosmos, csmip, esm, knet, rows
+from record_files import AFAD, AFAD_ROW, COUNTS, VALUES, cosmos, csmip, esm, knet, rows
 
 from vi_contact.core.errors import InputError
 from vi_contact.practice.ground_motion import (
@@ -198,6 +198,7 @@ def test_cosmos_unknown_step_comes_from_the_caller(tmp_path):
             csmip(values=VALUES).split("veloc data equally")[0][:-90],
             ["complete file", "11 samples"],
         ),
+        (csmip(values=[], unit="(8f10.3)"), ["does not state its units; pass units="]),
     ],
     ids=lambda value: value[-1] if isinstance(value, list) else "",
 )
@@ -233,6 +234,7 @@ def test_knet_counts_become_accelerations_without_offset(direction, tmp_path):
         (knet(scale="3920/6182761"), ["line 14", "scale factor"]),
         (knet(scale="3920(counts)/6182761"), ["line 14", "'counts' is not a unit"]),
         (knet().replace("100Hz", "many"), ["line 11", "has no positive number"]),
+        (knet([], seconds=0.004), ["line 12", "0.004 s at 100 Hz", "0 samples", "complete file"]),
         (knet().replace("  -9500", "  -95x0", 1), ["line 18", "'-95x0' is not a number"]),
     ],
     ids=lambda value: value[-1] if isinstance(value, list) else "",
@@ -320,11 +322,23 @@ def test_afad_columns_are_channels(channel, name, samples, tmp_path):
             {"channel": 1},
         ),
         (AFAD.replace("NUMBER", "Numbers"), ["does not give NUMBER OF DATA"], {"channel": 1}),
+        (
+            AFAD + 20 * AFAD_ROW + AFAD_ROW.replace("\n", "      0.260000\n") + AFAD_ROW,
+            ["line 33", "4 values instead of N-S, E-W and U-D; get the file again"],
+            {"channel": 1},
+        ),
     ],
     ids=lambda value: value[-1] if isinstance(value, list) else "",
 )
 def test_bad_afad_is_refused_in_one_sentence(text, words, options, tmp_path):
     refused(write(tmp_path, text), *words, **options)
+
+
+def test_a_row_of_more_numbers_is_not_taken_for_a_short_one(tmp_path):
+    """A decimal comma ends one more number than a whole one does."""
+    path = write(tmp_path, 15 * "0;0\n" + "0;1,5\n" + 4 * "0;0\n")
+    record = read_record(path, "m/s2", dt=0.01, channel=2)
+    assert record.acceleration[15] == 1.5 and np.count_nonzero(record.acceleration) == 1
 
 
 # --- OpenSees path series

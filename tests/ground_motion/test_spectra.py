@@ -30,7 +30,7 @@ from vi_contact.practice.ground_motion import (
     rms,
     significant_duration,
 )
-from vi_contact.practice.ground_motion.spectra import _factors, _move
+from vi_contact.practice.ground_motion.spectra import _compute_factors, _move
 
 pytestmark = pytest.mark.serial
 
@@ -61,7 +61,7 @@ def test_one_step_is_the_matrix_exponential(zeta, omega):
     system[1] = [-(omega**2), -2.0 * zeta * omega, -1.0, 0.0]
     exact = expm(h * system)[:2]
     u, v, a0, a1 = 0.3, -2.0, 1.7, -0.4
-    factors = _factors(h, h, np.array([omega]), zeta)
+    factors = _compute_factors(h, h, np.array([omega]), zeta)
     wanted = exact @ [u, v, a0, (a1 - a0) / h]
     size = np.array([abs(u) + h * abs(v), abs(v) + h * omega**2 * abs(u)])
     assert np.all(np.abs(_move(factors, u, v, a0, a1)[:, 0] - wanted) < 1e-13 * size)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from vi_contact.meshes.partition import destinations, halve
-from vi_contact.meshes.rows import found_in, number_alike
+from vi_contact.meshes.rows import are_among, number_alike
 
 pytestmark = pytest.mark.serial
 
@@ -67,6 +67,6 @@ def test_rows_are_alike_whatever_the_order_of_their_members():
     )
     assert one[1] == other[0]
     assert len({*one, *other}) == 4
-    assert found_in(one, other).tolist() == [False, True, False]
-    assert found_in(other, none).tolist() == [False, False]
-    assert found_in(none, one).tolist() == []
+    assert are_among(one, other).tolist() == [False, True, False]
+    assert are_among(other, none).tolist() == [False, False]
+    assert are_among(none, one).tolist() == []

@@ -18,7 +18,7 @@ from vi_contact.core.arguments import check_fields
 from vi_contact.core.checks import array
 from vi_contact.core.errors import InputError
 from vi_contact.core.quantities import NotNegative, Positive, Unit
-from vi_contact.exact.bouncing_bar import first_root
+from vi_contact.exact.bouncing_bar import find_first_root
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class SlidingBlock:
                 a, length = math.copysign(self.onset_acceleration, slope), length - wait
                 continue
             push = -a - sign * self.onset_acceleration
-            step = min(length, first_root(sign * v, sign * push, -sign * slope))
+            step = min(length, find_first_root(sign * v, sign * push, -sign * slope))
             u += step * (v + step * (0.5 * push - slope * step / 6.0))
             v = 0.0 if step < length else v + step * (push - 0.5 * slope * step)
             a, length = a + slope * step, length - step

@@ -60,7 +60,10 @@ COLUMNS = (
 class Snapshot:
     """Hold the beam at a time.
 
-    There are rows theta, omega, u, v at all nodes, the clamped one included, of shape (4, m + 1).
+    Args:
+        t: the time [s].
+        values: (4, m + 1), rows theta [-], omega [1/s], u [m], v [m/s] at all nodes, the clamped
+            one first.
     """
 
     t: float
@@ -101,9 +104,8 @@ class BeamRun:
             InputError: the path is none, or a file may not be written there.
         """
         file = checks.path("BeamRun.save", "the path", path)
-        return write_csv(
-            file, list(self.history), np.column_stack(list(self.history.values())).tolist()
-        )
+        rows = np.column_stack(list(self.history.values())).tolist()
+        return write_csv(file, list(self.history), rows)
 
 
 @dataclass(frozen=True)
@@ -153,21 +155,22 @@ class BeamStepper:
         )
         optional(function, owner, "load", self.load, "give a function of t in N/m, or None")
 
-    def given(self, t: float, rate: float) -> tuple[float, float, float]:
+    def evaluate(self, t: float, rate: float) -> tuple[float, float, float]:
         """Return (|r_N| [N], mu [-], load [N/m]) at a time t [s] and a slip rate [m/s].
 
         Raises:
             InputError: a function returns no finite number, or a negative force or coefficient.
         """
         owner = "BeamStepper"
-        at = f"({t:.6g} s)"
-        N = number(owner, f"normal_force{at}", self.normal_force(t), not_negative=True, unit="N")
-        mu = number(owner, f"mu({t:.6g} s, {rate:.6g} m/s)", self.mu(t, rate), not_negative=True)
-        return (
-            N,
-            mu,
-            0.0 if self.load is None else number(owner, f"load{at}", self.load(t), unit="N/m"),
+        time = f"{t:.6g} s"
+        N = number(
+            owner, f"normal_force({time})", self.normal_force(t), not_negative=True, unit="N"
         )
+        mu = number(owner, f"mu({time}, {rate:.6g} m/s)", self.mu(t, rate), not_negative=True)
+        load = 0.0
+        if self.load is not None:
+            load = number(owner, f"load({time})", self.load(t), unit="N/m")
+        return N, mu, load
 
 
 def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) -> BeamRun:
@@ -193,23 +196,25 @@ def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) 
     instance("run_beam", "start", start, Start, "give Start(...)")
     steps = whole("run_beam", "steps", steps, least=1)
     every = whole("run_beam", "every", every)
-    kept = (len(COLUMNS) + 1) * steps + (
-        4 * stepper.elements.count * (steps // every) if every else 0
-    )
-    counted("run_beam", f"a run of {steps} steps", kept, "numbers to keep")
+    size = (len(COLUMNS) + 1) * steps
+    if every:
+        size += 4 * stepper.elements.count * (steps // every)
+    counted("run_beam", f"a run of {steps} steps", size, "numbers to keep")
+
+    # March, and keep a row of each state and snapshots of some.
     x = stepper.elements.nodes(stepper.beam.length)
     y0 = np.concatenate([start.at("theta", x), start.at("u", x)])
     w0 = np.concatenate([start.at("omega", x), start.at("v", x)])
     rows = list[tuple[float, ...]]()
     snapshots = list[Snapshot]()
-    for k, (row, y, w) in enumerate(islice(_states(stepper, y0, w0), steps + 1)):
+    for k, (row, y, w) in enumerate(islice(_march(stepper, y0, w0), steps + 1)):
         rows.append(row)
         if every and k % every == 0:
-            values = np.zeros((4, len(x) + 1))
-            values[:, 1:] = np.stack([y.reshape(2, -1), w.reshape(2, -1)], axis=1).reshape(4, -1)
-            snapshots.append(Snapshot(row[0], values))
+            snapshots.append(Snapshot(row[0], _gather_values(y, w)))
     history = dict(zip(COLUMNS, np.array(rows, dtype=float).T, strict=True))
-    for name in ("work_input", "loss_damping", "loss_friction"):  # since the start
+
+    # Works and losses since the start, and what their balance leaves over.
+    for name in ("work_input", "loss_damping", "loss_friction"):
         history[name] = np.cumsum(history[name])
     energy = history["energy_kinetic"] + history["energy_strain"]
     spent = history["work_input"] - history["loss_damping"] - history["loss_friction"]
@@ -217,21 +222,36 @@ def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) 
     return BeamRun(np.insert(x, 0, 0.0), history, tuple(snapshots))
 
 
-def _states(
+def _gather_values(y: Array, w: Array) -> Array:
+    """Return theta, omega, u, v (4, m + 1) of y = (theta, u) and w = (omega, v), (2 m,) each."""
+    values = np.zeros((4, len(y) // 2 + 1))
+    values[:, 1:] = np.stack([y.reshape(2, -1), w.reshape(2, -1)], axis=1).reshape(4, -1)
+    return values
+
+
+def _march(
     stepper: BeamStepper, y: Array, w: Array
 ) -> Iterator[tuple[tuple[float, ...], Array, Array]]:
-    """Yield (values by COLUMNS, works and losses; y, w) at the start and after every step.
+    """Yield (values by COLUMNS, y, w) at the start and after every step.
 
-    Works and losses are those of the step alone.
+    Works and losses among the values are those of the step alone.
+
+    Args:
+        stepper: the beam, its time step and what acts on it.
+        y: (2 m,) at the start, theta [-] and u [m].
+        w: (2 m,) their rates.
     """
     dt = stepper.dt
     viscosity = stepper.beam.viscosity
     M, S, uniform = beam_matrices(stepper.beam, stepper.elements)
 
     def energies() -> tuple[float, float]:
+        """Return the kinetic and the strain energy [J] of the present state."""
         return 0.5 * float(w @ (M @ w)), 0.5 * float(y @ (S @ y))
 
     yield (0.0, y[-1], w[-1], *[0.0] * 5, *energies(), 0.0, 0.0, 0.0), y, w
+
+    # P, factorised once without the tip, and condensed to it: c.
     P = ((2.0 / dt**2) * M + (viscosity / dt + 0.5) * S).tocsr()
     T = SerialFactor(SerialMatrix(P[:-1, :-1]))
     p = P[:-1, -1].toarray().ravel()
@@ -239,41 +259,42 @@ def _states(
     c = float(P[-1, -1] - p @ column)
     for k in count():
         t = k * dt
-        at = f"step {k + 1}, t = {k * dt + dt:.6g} s"
-        N, mu, f = stepper.given(t, abs(float(w[-1])))
+        place = f"step {k + 1}, t = {k * dt + dt:.6g} s"
+
+        # The slip of the tip (7.8), then the increment of all unknowns (7.10) and rates (7.11).
+        N, mu, f = stepper.evaluate(t, abs(float(w[-1])))
         r = (2.0 / dt) * (M @ w) - S @ y + f * uniform
         free = T.solve(r[:-1])
         try:
             slip = stepper.friction.solve(c, float(r[-1] - p @ free), mu * N)
         except StepFailure as failure:
-            raise StepFailure(f"{at}: {failure}") from None
-        moved = np.append(free - slip.s * column, slip.s)
-        y = y + moved
-        w = (2.0 / dt) * moved - w
+            raise StepFailure(f"{place}: {failure}") from None
+        d = np.append(free - slip.s * column, slip.s)
+        y = y + d
+        w = (2.0 / dt) * d - w
+
+        # Energies, and the terms of (6.5).
         kinetic, strain = energies()
-        work = f * float(uniform @ moved)
-        viscous = viscosity / dt * float(moved @ (S @ moved))
+        work = f * float(uniform @ d)
+        viscous = viscosity / dt * float(d @ (S @ d))
         if not np.isfinite(kinetic + strain + work):
             raise StepFailure(
-                f"{at}: the beam's motion or its energy is no finite number; check the loads and "
-                "the state at the start"
+                f"{place}: the beam's motion or its energy is no finite number; check the loads "
+                "and the state at the start"
             )
-        yield (
-            (
-                (k + 1) * dt,
-                y[-1],
-                w[-1],
-                slip.force,
-                slip.s,
-                N,
-                mu,
-                slip.updates,
-                kinetic,
-                strain,
-                work,
-                viscous,
-                slip.force * slip.s,
-            ),
-            y,
-            w,
+        values = (
+            (k + 1) * dt,
+            y[-1],
+            w[-1],
+            slip.force,
+            slip.s,
+            N,
+            mu,
+            slip.updates,
+            kinetic,
+            strain,
+            work,
+            viscous,
+            slip.force * slip.s,
         )
+        yield values, y, w

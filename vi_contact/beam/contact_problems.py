@@ -68,8 +68,8 @@ def rod_problem(rod: Rod, elements: Elements, start: Start | None = None) -> Con
     """
     _check("rod_problem", elements, (start,), rod=rod)
     x = elements.nodes(rod.length)
-    start = start or Start()
-    return _problem(x, _Part.of_rod(rod, elements, start), None, rod.gap, Frictionless())
+    bar = _Part.of_rod(rod, elements, start or Start())
+    return _assemble_problem(x, bar, None, rod.gap, Frictionless())
 
 
 def beam_problem(
@@ -112,11 +112,21 @@ def beam_problem(
         "give a function of t that returns |r_N| >= 0 in N",
     )
     x = elements.nodes(beam.length)
+
+    # The point mass along the axis, which the given force presses against the wall.
     mass = sp.csr_matrix([[beam.rho * beam.area * beam.length]])
-    push = ((np.ones(1), _given("normal_force", normal_force, "N")),)
-    rest = np.zeros(1)
-    point = _Part(mass, sp.csr_matrix((1, 1)), 0.0, push, rest, rest, inertia=mass @ np.ones(1))
-    return _problem(x, point, _Part.of_beam(beam, elements, start or Start(), load), 0.0, friction)
+    push = ((np.ones(1), _check_values("normal_force", normal_force, "N")),)
+    point = _Part(
+        M=mass,
+        K=sp.csr_matrix((1, 1)),
+        viscosity=0.0,
+        loads=push,
+        u0=np.zeros(1),
+        v0=np.zeros(1),
+        inertia=mass @ np.ones(1),
+    )
+    across = _Part.of_beam(beam, elements, start=start or Start(), load=load)
+    return _assemble_problem(x, point, across, 0.0, friction)
 
 
 def rubbing_problem(
@@ -161,9 +171,8 @@ def rubbing_problem(
         )
     x = elements.nodes(beam.length)
     bar = _Part.of_rod(rod, elements, rod_start or Start())
-    return _problem(
-        x, bar, _Part.of_beam(beam, elements, start or Start(), load), rod.gap, friction
-    )
+    across = _Part.of_beam(beam, elements, start=start or Start(), load=load)
+    return _assemble_problem(x, bar, across, rod.gap, friction)
 
 
 @dataclass(frozen=True)
@@ -238,10 +247,16 @@ def rod_forces(
 
 @dataclass(frozen=True)
 class _Part:
-    """Hold the matrices of the unknowns along the axis, or of those across.
+    """Hold what belongs to the unknowns along the axis, or to those across.
 
-    There are matrices, loads, initial values and mass; C = viscosity K. ``inertia`` [kg]: the force
-    when unknowns and clamped node are accelerated together by one.
+    Args:
+        M: mass, sparse (n, n).
+        K: stiffness, sparse (n, n).
+        viscosity: a of the damping C = a K [s].
+        loads: a vector (n,) and its factor as a function of time, of each load.
+        u0: values (n,) at t = 0.
+        v0: their rates (n,) at t = 0.
+        inertia: (n,) forces when unknowns and clamped node are accelerated together by one [kg].
     """
 
     M: Any
@@ -254,46 +269,57 @@ class _Part:
 
     @classmethod
     def of_rod(cls, rod: Rod, elements: Elements, start: Start) -> "_Part":
+        """Return the part along the axis of a rod.
+
+        Args:
+            rod: the body and its loads.
+            elements: equal linear elements.
+            start: u [m] and v [m/s] at t = 0.
+        """
         x = elements.nodes(rod.length)
         M, K, uniform = rod_matrices(rod, elements.count)
         tip = np.zeros_like(x)
         tip[-1] = 1.0
-        given = (
-            (uniform, "body_force", rod.body_force, "N/m"),
-            (tip, "end_force", rod.end_force, "N"),
-        )
-        loads = tuple(
-            (vector, _given(name, history, unit))
-            for vector, name, history, unit in given
-            if history
-        )
+        loads = []
+        if rod.body_force:
+            loads.append((uniform, _check_values("body_force", rod.body_force, "N/m")))
+        if rod.end_force:
+            loads.append((tip, _check_values("end_force", rod.end_force, "N")))
         return cls(
-            M,
-            K,
-            rod.viscosity,
-            loads,
-            start.at("u", x),
-            start.at("v", x),
-            rod.rho * rod.area * uniform,
+            M=M,
+            K=K,
+            viscosity=rod.viscosity,
+            loads=tuple(loads),
+            u0=start.at("u", x),
+            v0=start.at("v", x),
+            inertia=rod.rho * rod.area * uniform,
         )
 
     @classmethod
     def of_beam(
-        cls, beam: TimoshenkoBeam, elements: Elements, start: Start, load: History | None
+        cls, beam: TimoshenkoBeam, elements: Elements, *, start: Start, load: History | None
     ) -> "_Part":
+        """Return the part across the axis of a beam: its rotations, then its deflections.
+
+        Args:
+            beam: the body.
+            elements: equal elements of deflection and rotation.
+            start: u [m], v [m/s], theta [-] and omega [1/s] at t = 0.
+            load: t [s] -> uniform force across [N/m]; None: no load.
+        """
         x = elements.nodes(beam.length)
         M, S, uniform = beam_matrices(beam, elements)
         y = np.concatenate([start.at("theta", x), start.at("u", x)])
         w = np.concatenate([start.at("omega", x), start.at("v", x)])
-        loads = () if load is None else ((uniform, _given("load", load, "N/m")),)
-        return cls(M, S, beam.viscosity, loads, y, w, beam.rho * beam.area * uniform)
+        loads = () if load is None else ((uniform, _check_values("load", load, "N/m")),)
+        inertia = beam.rho * beam.area * uniform
+        return cls(M=M, K=S, viscosity=beam.viscosity, loads=loads, u0=y, v0=w, inertia=inertia)
 
 
-def _given(name: str, history: History, unit: str) -> History:
-    """Return the function.
+def _check_values(name: str, history: History, unit: str) -> History:
+    """Return the function with a check of every value that it returns.
 
-    It raises InputError, naming the time, where it returns no finite number, or a negative normal
-    force.
+    The check raises InputError, naming the time, for no finite number, or a negative normal force.
     """
     pressing = name == "normal_force"
     return lambda t: number(
@@ -306,45 +332,67 @@ def _check(
     elements: Elements,
     starts: tuple[Start | None, ...],
     load: History | None = None,
-    **given: Any,
+    **parts: Any,
 ) -> None:
-    """InputError for what is no element count, start, load, rod, beam or friction law."""
+    """Raise InputError for what is no element count, start, load, rod, beam or friction law.
+
+    Args:
+        owner: who asks, for messages.
+        elements: the elements.
+        starts: initial values of each part, or None.
+        load: across the beam, or None.
+        **parts: rod, beam and friction, those of them that there are.
+    """
     instance(owner, "elements", elements, Elements, "give Elements(count)")
     for start in starts:
         instance(owner, "start", start, (Start, type(None)), "give Start(...), or None")
     optional(function, owner, "load", load, "give a function of t in N/m, or None")
     for name, kind in (("rod", Rod), ("beam", TimoshenkoBeam)):
-        if name in given:
-            instance(owner, name, given[name], kind, f"give a {kind.__name__}")
-    if "friction" in given:
+        if name in parts:
+            instance(owner, name, parts[name], kind, f"give a {kind.__name__}")
+    if "friction" in parts:
         provides(
             owner,
             "friction",
-            given["friction"],
+            parts["friction"],
             ("limit", "slope", "at"),
             "give a law, for example Coulomb(mu)",
         )
 
 
-def _problem(
+def _assemble_problem(
     x: Array, along: _Part, across: _Part | None, gap: float, friction: FrictionLaw
 ) -> ContactProblem:
+    """Return the contact problem of the parts along and across the axis.
+
+    Args:
+        x: (m,) positions of the nodes but the clamped one [m].
+        along: part of the unknowns along the axis, of the last nodes.
+        across: part of the rotations and deflections of all nodes; None for no beam.
+        gap: distance of the wall at rest [m].
+        friction: law of the tip.
+    """
     parts = [along] if across is None else [along, across]
     sizes = [len(part.u0) for part in parts]
     m = len(x)
     d = 1 if across is None else 2
+
+    # The loads of a part are zero on the other one.
     loads = []
     for i, part in enumerate(parts):
         for vector, history in part.loads:
-            whole = [np.zeros(size) for size in sizes]
-            whole[i] = vector
-            loads.append((np.concatenate(whole), history))
-    damped = any(part.viscosity for part in parts)
+            pieces = [np.zeros(size) for size in sizes]
+            pieces[i] = vector
+            loads.append((np.concatenate(pieces), history))
+
+    # Node and component of every unknown: along the axis 0, of rotations -1, across 1.
     nodes = np.append(0.0, x)[:, None] * np.eye(1, d)  # the first one is clamped
-    last = np.arange(1, m + 1)
-    meaning = [np.column_stack([last[m - sizes[0] :], np.zeros(sizes[0])])]
-    # rotations, across
-    meaning += [] if across is None else [np.column_stack([last, np.full(m, c)]) for c in (-1, 1)]
+    numbers = np.arange(1, m + 1)
+    meaning = [np.column_stack([numbers[m - sizes[0] :], np.zeros(sizes[0])])]
+    if across is not None:
+        meaning.append(np.column_stack([numbers, np.full(m, -1)]))
+        meaning.append(np.column_stack([numbers, np.full(m, 1)]))
+    damped = any(part.viscosity for part in parts)
     system = system_from_arrays(
         sp.block_diag([part.M for part in parts]),
         sp.block_diag([part.viscosity * part.K for part in parts]) if damped else None,
@@ -355,12 +403,13 @@ def _problem(
         u0=np.concatenate([part.u0 for part in parts]),
         v0=np.concatenate([part.v0 for part in parts]),
     )
+
+    # What the clamped node adds to the inertia of a rigid motion.
     inertia = sp.block_diag([part.inertia[:, None] for part in parts]).toarray()
-    system = system.changed(
-        base_mass=inertia - np.column_stack([system.M @ rigid for rigid in system.influence.T])
-    )
-    # one point, its weight 1: pressures are forces
+    inertia_of_unknowns = np.column_stack([system.M @ rigid for rigid in system.influence.T])
+    system = system.changed(base_mass=inertia - inertia_of_unknowns)
+
+    # The tip is one point of weight 1: pressures are forces.
     tip = contact_points(system, [m], np.eye(1, d), gap0=gap)
-    return ContactProblem(
-        system, tip, friction=friction, mass=None if across is None else ConsistentMass()
-    )
+    mass = None if across is None else ConsistentMass()
+    return ContactProblem(system, tip, friction=friction, mass=mass)

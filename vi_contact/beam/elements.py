@@ -36,6 +36,7 @@ MOST = 5_000_000  # elements
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)  # exact to degree 7: squares of cubics
 S = 0.5 * (_POINTS + 1.0)
 W = 0.5 * _WEIGHTS
+_Tables = tuple[Array, Array]
 
 
 @dataclass(frozen=True)
@@ -74,16 +75,16 @@ class Elements:
         Raises:
             InputError: the length [m] is not positive.
         """
-        return np.linspace(
-            0.0, number("Elements.nodes", "length", length, positive=True, unit="m"), self.count + 1
-        )[1:]
+        length = number("Elements.nodes", "length", length, positive=True, unit="m")
+        return np.linspace(0.0, length, self.count + 1)[1:]
 
 
 @checked
 def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> tuple[Any, Any, Array]:
     """Assemble the matrices of the beam: ½ wᵀMw and ½ yᵀSy are its energies [J], and C = a2 S.
 
-    They are made of M1, M2, K1, K2, L1 of section 7 of Ahn (2012) with their coefficients.
+    They are made of M1, M2, K1, K2, L1 of section 7 of Ahn (2012) with their coefficients; N1
+    is the integral of theta_i theta_j in the shear energy.
 
     Returns:
         M and S, sparse (2 m, 2 m), of y = (theta_1 … theta_m [-], u_1 … u_m [m]), and the forces
@@ -94,34 +95,52 @@ def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> tuple[Any, Any, A
     """
     m = elements.count
     h = beam.length / elements.count
+
+    # Tables (2, points) of the two functions of an element and of their slopes, at the points of
+    # integration: a pair of tables for the inner elements and the last one.
     lines = _lines(S)
     slopes = _line_slopes(S) / h
-    turn, bend = lines, slopes
+    rotations = (lines, lines)
+    curvatures = (slopes, slopes)
     if elements.published_end:
-        turn = np.array([1.0 - S, -(S**3) + S**2 + S])
-        bend = np.array([-np.ones_like(S), -3.0 * S**2 + 2.0 * S + 1.0]) / h
-    middle = np.array([0.5])
-    at, weight = (middle, np.ones(1)) if elements.reduced_shear else (S, W)
-    shear_u = _line_slopes(at) / h
-    shear_turn = [_lines(at), turn if elements.published_end else _lines(at)]
-    ends = (lines, turn), (slopes, bend)
+        end_rotations = np.array([1.0 - S, -(S**3) + S**2 + S])
+        end_curvatures = np.array([-np.ones_like(S), -3.0 * S**2 + 2.0 * S + 1.0]) / h
+        rotations = (lines, end_rotations)
+        curvatures = (slopes, end_curvatures)
+    deflections = (lines, lines)
 
-    def matrix(left: Any, right: Any, weights: Array) -> Any:
-        """Return ∫ left_i right_j over all elements.
+    # The same at the points of integration of the shear energy: one, or as elsewhere.
+    if elements.reduced_shear:
+        shear_points = np.array([0.5])
+        shear_weights = np.ones(1)
+    else:
+        shear_points = S
+        shear_weights = W
+    shear_lines = _lines(shear_points)
+    shear_slopes = _line_slopes(shear_points) / h
+    shear_rotations = (shear_lines, rotations[1] if elements.published_end else shear_lines)
+    shear_deflections = (shear_slopes, shear_slopes)
 
-        There is a pair of tables for the inner elements and the last one.
+    def integrate(rows: _Tables, columns: _Tables, weights: Array) -> Any:
+        """Return the matrix (m, m) of ∫ row_i column_j over all elements.
+
+        Args:
+            rows: tables of the functions of the rows, of the inner elements and the last one.
+            columns: tables of the functions of the columns, likewise.
+            weights: (points,) of the integration.
         """
-        inner, last = (h * (a * weights) @ b.T for a, b in zip(left, right, strict=True))
-        return _assembled(inner, last, m)
+        inner = h * (rows[0] * weights) @ columns[0].T
+        last = h * (rows[1] * weights) @ columns[1].T
+        return _assemble(inner, last, m)
 
-    turns = ends[0]
-    bends = ends[1]
-    plain = (lines, lines)
-    steep = (shear_u, shear_u)
-    EI, KAG = beam.bending_stiffness, beam.shear_stiffness
-    M1, K1 = matrix(turns, turns, W), matrix(bends, bends, W)
-    M2, K2 = matrix(plain, plain, W), matrix(steep, steep, weight)
-    N1, L1 = matrix(shear_turn, shear_turn, weight), matrix(shear_turn, steep, weight)
+    M1 = integrate(rotations, rotations, W)
+    K1 = integrate(curvatures, curvatures, W)
+    M2 = integrate(deflections, deflections, W)
+    K2 = integrate(shear_deflections, shear_deflections, shear_weights)
+    N1 = integrate(shear_rotations, shear_rotations, shear_weights)
+    L1 = integrate(shear_rotations, shear_deflections, shear_weights)
+    EI = beam.bending_stiffness
+    KAG = beam.shear_stiffness
     M = sp.block_diag([beam.rho * beam.inertia * M1, beam.rho * beam.area * M2]).tocsr()
     stiffness = sp.bmat([[EI * K1 + KAG * N1, -KAG * L1], [-KAG * L1.T, KAG * K2]]).tocsr()
     load = np.concatenate([np.zeros(m), _uniform(m, h)])
@@ -142,12 +161,11 @@ def rod_matrices(rod: Rod, count: Annotated[int, Between(2, math.inf)]) -> tuple
     h = rod.length / count
     lines = _lines(S)
     slopes = _line_slopes(S) / h
-    M, K = (h * (a * W) @ a.T for a in (lines, slopes))
-    return (
-        rod.rho * rod.area * _assembled(M, M, count),
-        rod.E * rod.area * _assembled(K, K, count),
-        _uniform(count, h),
-    )
+    element_mass = h * (lines * W) @ lines.T
+    element_stiffness = h * (slopes * W) @ slopes.T
+    M = rod.rho * rod.area * _assemble(element_mass, element_mass, count)
+    K = rod.E * rod.area * _assemble(element_stiffness, element_stiffness, count)
+    return M, K, _uniform(count, h)
 
 
 def _lines(s: Array) -> Array:
@@ -156,23 +174,25 @@ def _lines(s: Array) -> Array:
 
 
 def _line_slopes(s: Array) -> Array:
-    """Their slopes times h."""
+    """Return the slopes of the two linear functions times h, shape (2, len(s))."""
     return np.array([-np.ones_like(s), np.ones_like(s)])
 
 
 def _uniform(m: int, h: float) -> Array:
-    """∫ of each function: h, half of it at the tip."""
+    """Return ∫ of each function of m elements of length h [m]: h, half of it at the tip."""
     load = np.full(m, h)
     load[-1] *= 0.5
     return load
 
 
-def _assembled(inner: Array, last: Array, m: int) -> Any:
+def _assemble(inner: Array, last: Array, m: int) -> Any:
     """Return the (m, m) matrix of m element matrices (2, 2).
 
     They are all ``inner`` but the last; node 0 is clamped.
     """
-    middle = np.full(m, inner[1, 1] + inner[0, 0])
-    middle[-2:] = inner[1, 1] + last[0, 0], last[1, 1]
-    below, above = (np.append(np.full(m - 2, inner[at]), last[at]) for at in ((1, 0), (0, 1)))
-    return sp.diags((below, middle, above), (-1, 0, 1)).tocsr()
+    diagonal = np.full(m, inner[1, 1] + inner[0, 0])
+    diagonal[-2] = inner[1, 1] + last[0, 0]
+    diagonal[-1] = last[1, 1]
+    below = np.append(np.full(m - 2, inner[1, 0]), last[1, 0])
+    above = np.append(np.full(m - 2, inner[0, 1]), last[0, 1])
+    return sp.diags((below, diagonal, above), (-1, 0, 1)).tocsr()

@@ -30,7 +30,9 @@ STEPS = 1000
 def published_mu(t: float, rate: float) -> float:
     """Return the coefficient mu = |slip rate|/100 [-] of Ahn (2012), section 8.
 
-    t [s] is not used, the rate is in m/s.
+    Args:
+        t: time [s], which is not used.
+        rate: slip rate [m/s].
 
     Raises:
         InputError: the rate is no finite number.

@@ -59,7 +59,10 @@ class ExactFriction:
     def solve(self, c: float, g: float, limit: float) -> Slip:
         """Return s = (g - R)/c [m] with R [N] the point of [-limit, limit] nearest to g.
 
-        c [N/m], g [N] and limit [N] are those of ``TipFriction``.
+        Args:
+            c: stiffness of the step at the tip, positive [N/m].
+            g: the force that would hold the tip [N].
+            limit: mu |r_N| >= 0 [N].
         """
         force = min(max(g, -limit), limit)
         return Slip((g - force) / c, force, 0)
@@ -100,25 +103,37 @@ class RegularisedFriction:
         check_fields(self)
 
     def solve(self, c: float, g: float, limit: float) -> Slip:
-        """Return the zero of F; c [N/m], g [N] and limit [N] are those of ``TipFriction``.
+        """Return the zero of F.
+
+        Args:
+            c: stiffness of the step at the tip, positive [N/m].
+            g: the force that would hold the tip [N].
+            limit: mu |r_N| >= 0 [N].
 
         Raises:
             StepFailure: max_iterations updates do not reach the tolerance.
         """
-        # a little wider: the zero may be its end
-        s, low, high = (0.0, *sorted((0.0, g / c * (1.0 + 1e-9))))
+        # The bracket of the zero is a little wider than 0 to g/c, as the zero may be its end.
+        low, high = sorted((0.0, g / c * (1.0 + 1e-9)))
+        s = 0.0
         for updates in range(self.max_iterations + 1):
             root = math.hypot(s, self.eps)
             F = root * (c * s - g) + limit * s
-            round_off = 1e-15 * (abs(c * s) + abs(g) + limit) * root
-            if abs(F) <= (
-                self.tolerance * c * self.eps**2 + round_off
-                if self.absolute is None
-                else self.absolute
-            ):
+            if self.absolute is None:
+                round_off = 1e-15 * (abs(c * s) + abs(g) + limit) * root
+                negligible = self.tolerance * c * self.eps**2 + round_off
+            else:
+                negligible = self.absolute
+            if abs(F) <= negligible:
                 return Slip(s, limit * s / root, updates)
-            if self.safeguard:
-                low, high = (s, high) if F < 0.0 else (low, s)
+
+            # F rises through its zero: its sign says on which side of it s is.
+            if self.safeguard and F < 0.0:
+                low = s
+            elif self.safeguard:
+                high = s
+
+            # Newton's update, or the middle of the bracket where it leaves that.
             slope = s / root * (c * s - g) + root * c + limit
             s = s - F / slope if slope else math.inf
             if self.safeguard and not low <= s <= high:

@@ -141,6 +141,5 @@ class Start:
         """
         values = getattr(self, name)(x)
         shape = () if shape_of(values) == () else x.shape
-        return np.broadcast_to(
-            array("Start", f"what {name}(x) returns", values, shape), x.shape
-        ).copy()
+        numbers = array("Start", f"what {name}(x) returns", values, shape)
+        return np.broadcast_to(numbers, x.shape).copy()

@@ -217,9 +217,10 @@ def polygon(
     else:
         length = number("polygon", "the element length h", h, positive=True, unit="m")
         with np.errstate(over="ignore"):
-            wanted = np.maximum(1.0, np.ceil(np.hypot(*sides.T) / length - 1e-9))
-        counted("polygon", f"h = {length:g} m", float(wanted.sum()), "elements", most=MOST_ELEMENTS)
-        counts = wanted.astype(int)
+            numbers = np.maximum(1.0, np.ceil(np.hypot(*sides.T) / length - 1e-9))
+        total = float(numbers.sum())
+        counted("polygon", f"h = {length:g} m", total, "elements", most=MOST_ELEMENTS)
+        counts = numbers.astype(int)
     counted("polygon", "h", int(counts.sum()), "elements", most=MOST_ELEMENTS)
     fractions = [np.arange(count)[:, None] / count for count in counts]
     points = [p + f * side for p, f, side in zip(start, fractions, sides, strict=True)]

@@ -100,7 +100,7 @@ class CompressedBlocks:
         """
         return np.asarray(np.max([part.errors for part in self.stretches], axis=0))
 
-    def combined(self, weights: NDArray) -> Iterator[tuple[NDArray, NDArray, NDArray]]:
+    def combine(self, weights: NDArray) -> Iterator[tuple[NDArray, NDArray, NDArray]]:
         """Yield complex sums of single, double and hyper over all steps, for each row of weights.
 
         The weights are (f, up to reach).
@@ -148,7 +148,7 @@ class CompressedBlocks:
         order = np.argsort(numbers, kind="stable")
         return numbers[order], rows[order], columns[order]
 
-    def applied(self, p: Array, u: Array, jumps: Array) -> list[Array]:
+    def apply(self, p: Array, u: Array, jumps: Array) -> list[Array]:
         """Return sum_j V^j p_j, K^j u_j, K^jᵀ jumps_j, D^j u_j.
 
         Args:
@@ -177,7 +177,7 @@ class CompressedBlocks:
         return np.split(total, [4 * n, 8 * n, 10 * n])
 
 
-def compressed_blocks(
+def compress_blocks(
     mesh: BoundaryMesh,
     pairs: ElementPairs,
     speeds: tuple[float, float],
@@ -202,7 +202,7 @@ def compressed_blocks(
     counted("boundary elements", f"a circle of {steps} steps", steps, "steps", most=LONGEST)
     reach = AHEAD * steps
     n = len(mesh)
-    above, spans = _windows(mesh, pairs, speeds, dt, reach)
+    above, spans = _find_windows(mesh, pairs, speeds, dt, reach)
     windows, group = np.unique(spans, axis=1, return_inverse=True)
     group = np.ravel(group)
     h = float(mesh.lengths.max())
@@ -220,24 +220,24 @@ def compressed_blocks(
     for number, (begin, end) in enumerate(windows.T):
         a, b = above[:, group == number]
         kept_tail, weights, errors = tails[int(end)]
-        places = _places_of(matrices, a, b)
-        kept = np.append(np.arange(begin, end), kept_tail)
-        values = np.empty((len(kept), len(places)))
+        places = _find_places(matrices, a, b)
+        steps_of_window = np.append(np.arange(begin, end), kept_tail)
+        values = np.empty((len(steps_of_window), len(places)))
         stretches.append(Stretch(int(begin), int(end), kept_tail, weights, errors, places, values))
 
         # A block of step j is a difference of operators at the times j - 1, j and j + 1.
-        times = np.add.outer(kept, (-1, 0, 1))
+        times = np.add.outer(steps_of_window, (-1, 0, 1))
         pairs_of_nodes.append((a, b, np.isin(np.arange(-1, reach + 1), times)))
 
     def among(i: int) -> Mask:
         """Return the pairs of elements (p,) that blocks to keep need at the time i dt."""
-        wanted = np.zeros((n, n), bool)
+        is_needed = np.zeros((n, n), bool)
         for a, b, needed in pairs_of_nodes:
-            wanted[a, b] = needed[i + 1]
+            is_needed[a, b] = needed[i + 1]
         # An entry at a node comes from the element that starts there and the one before.
-        wanted |= wanted[mesh.after]
-        wanted |= wanted[:, mesh.after]
-        return wanted[pairs.first, pairs.second] | wanted[pairs.second, pairs.first]
+        is_needed |= is_needed[mesh.after]
+        is_needed |= is_needed[:, mesh.after]
+        return is_needed[pairs.first, pairs.second] | is_needed[pairs.second, pairs.first]
 
     for j, blocks in enumerate(assemble(among)):
         if blocks is None:
@@ -246,11 +246,11 @@ def compressed_blocks(
         for part in stretches:
             part.record(j, numbers)
     order = np.concatenate([part.places for part in stretches])
-    places = _places_among(matrices, order)
+    places = _locate_entries(matrices, order)
     return CompressedBlocks(mesh, *speeds, dt, steps, reach, tuple(stretches), places)
 
 
-def _windows(
+def _find_windows(
     mesh: BoundaryMesh,
     pairs: ElementPairs,
     speeds: tuple[float, float],
@@ -260,6 +260,13 @@ def _windows(
     """Return the pairs of nodes a <= b (2, p), and the steps (2, p) where their windows are.
 
     A window begins before the first wave arrives, and ends when its points of quadrature rest.
+
+    Args:
+        mesh: the boundary, of n elements.
+        pairs: its pairs of elements.
+        speeds: (c_P, c_S) [m/s].
+        dt: time step [s].
+        reach: number of steps that are kept.
     """
     n = len(mesh)
     h = float(mesh.lengths.max())
@@ -275,7 +282,7 @@ def _windows(
         farthest = np.maximum(farthest, np.take(farthest, before, axis))
 
     first = (-farthest[0] / (speeds[0] * dt)).astype(int)
-    # half a step late or more: rounding does not matter
+    # It ends half a step late or more, so that rounding does not matter.
     smooth = ((farthest[1] + h) / (speeds[1] * dt) + 2.5).astype(int)
     spans = np.minimum([first - first % MULTIPLE, smooth + -smooth % MULTIPLE], reach)
     above = np.stack(np.triu_indices(n))
@@ -288,7 +295,7 @@ def _number_entries(n: int) -> tuple[Indices, Indices, Indices]:
     return single.reshape(4 * n, 4 * n), double.reshape(4 * n, 2 * n), hyper.reshape(2 * n, 2 * n)
 
 
-def _places_of(matrices: tuple[Indices, Indices, Indices], a: Indices, b: Indices) -> Indices:
+def _find_places(matrices: tuple[Indices, Indices, Indices], a: Indices, b: Indices) -> Indices:
     """Return the places of the entries of pairs of nodes, half of those of symmetric matrices.
 
     Args:
@@ -305,7 +312,7 @@ def _places_of(matrices: tuple[Indices, Indices, Indices], a: Indices, b: Indice
     return np.concatenate([part.ravel() for part in parts])
 
 
-def _places_among(matrices: tuple[Indices, Indices, Indices], order: Indices) -> Indices:
+def _locate_entries(matrices: tuple[Indices, Indices, Indices], order: Indices) -> Indices:
     """Return where every entry of the matrices of a step stands among the kept numbers.
 
     ``order`` has the places of the kept numbers. Of two mirrored entries one is kept, and both get

@@ -201,7 +201,7 @@ class BoundaryContact:
         points = self.compliance.points
         normals = self.compliance.normals
         directions = np.asarray(self.obstacle.directions(points, normals))
-        # the obstacle follows the boundary; a plane has one direction
+        # Refused where the obstacle follows the boundary; a plane has one direction.
         if np.max(np.abs(directions - normals)) <= 1e-9:
             raise InputError(
                 f"BoundaryContact: the contact boundary turns by {np.degrees(turns[corner]):.3g} "

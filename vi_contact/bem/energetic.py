@@ -33,7 +33,7 @@ from ..core.errors import InputError
 from ..laws.materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
 from .boundary_operators import Galerkin, OperatorMatrices, check_body
-from .compressed import AHEAD, NUMBERS, CompressedBlocks, compressed_blocks
+from .compressed import AHEAD, NUMBERS, CompressedBlocks, compress_blocks
 from .fundamental_solution import TimeKernels
 from .quadrature import Orders
 
@@ -148,7 +148,7 @@ def energetic_blocks(
         return _difference_blocks(galerkin, speeds, dt, last, threads, among)
 
     if not dense:
-        return compressed_blocks(mesh, galerkin.pairs, speeds, dt, steps, assemble_blocks)
+        return compress_blocks(mesh, galerkin.pairs, speeds, dt, steps, assemble_blocks)
     single = np.empty((steps, 4 * n, 4 * n))
     double = np.empty((steps, 4 * n, 2 * n))
     hyper = np.empty((steps, 2 * n, 2 * n))
@@ -247,9 +247,9 @@ def march_blocks(
     single = blocks.single[0]
     v0 = cho_factor(0.5 * (single + single.T))
     right = blocks.double[0] + 0.5 * mass
-    left = right.T if symmetric else mass.T
+    tested = right.T if symmetric else mass.T
     v0_right = cho_solve(v0, right)
-    s0 = left @ v0_right
+    s0 = tested @ v0_right
     if symmetric:
         s0 -= blocks.hyper[0]
         s0 = 0.5 * (s0 + s0.T)
@@ -261,13 +261,12 @@ def march_blocks(
     before = np.zeros((unknowns, count))  # displacement at the start of the step
     for k in range(steps):
         # What earlier steps have left: traction at no increment, and the nodal forces of it.
-        past = sum_products(blocks.single[k:0:-1], p[:k]) - sum_products(
-            blocks.double[k:0:-1], u[:k]
-        )
+        past = sum_products(blocks.single[k:0:-1], p[:k])
+        past = past - sum_products(blocks.double[k:0:-1], u[:k])
         v0_early = cho_solve(v0, 0.5 * mass @ before - past)
-        known = left @ v0_early
+        known = tested @ v0_early
         if symmetric and k:
-            known = known + _adjoint(blocks, p[:k], u[:k])
+            known = known + _sum_adjoint(blocks, p[:k], u[:k])
 
         # Solve for the free increments; then tractions, and reactions of the fixed unknowns.
         if prescribed is not None:
@@ -281,7 +280,7 @@ def march_blocks(
     return np.cumsum(u, axis=0, out=u), p, total
 
 
-def _adjoint(blocks: EnergeticBlocks, p: Array, u: Array) -> Array:
+def _sum_adjoint(blocks: EnergeticBlocks, p: Array, u: Array) -> Array:
     """Return the sum of K' p - D u over the k earlier steps of the symmetric form.
 
     K'^j = (K^j - K^(j-1))ᵀ: its sum with p is that of K^jᵀ with the jumps of p, but for the last

@@ -62,7 +62,6 @@ def solve_on_circle(
     """
     steps = len(forces)
     m = len(units)
-    mass = blocks.mesh.mass
     free = ~fixed
     if steps > blocks.steps:
         raise InputError(
@@ -80,75 +79,117 @@ def solve_on_circle(
 
     # Of all unit forces one is kept whole, in order to check it.
     one_unit = units[m // 2 : m // 2 + 1]
-    kept_columns = np.array([m, m // 2][: 1 + len(one_unit)])
-    pulls, given = _given_columns(forces, fixed, prescribed, one_unit)
+    pulls, prescribed_columns = _gather_columns(forces, fixed, prescribed, one_unit)
 
     def transform(values: Array) -> NDArray:
         """Return the values at the frequencies: the transform of what is scaled by R^j."""
         return np.fft.rfft(values * scale[:, None, None], count, axis=0)
 
     loads = transform(pulls)
-    u = transform(np.diff(given, axis=0, prepend=0.0))
+    u = transform(np.diff(prescribed_columns, axis=0, prepend=0.0))
+    W, p = _solve_frequencies(blocks, circle, fixed, units, u, loads, symmetric=symmetric)
+
+    # Back to the steps, of which there are twice as many as asked for.
+    histories = [np.fft.irfft(values, count, axis=0) for values in (W, u, p, loads)]
+    lost = max(_estimate_wrapped_share(values, radius) for values in histories[:2])
+    if not lost <= SHARE:
+        raise StepFailure(
+            _write_refusal(
+                f"adds {lost:.1e} of the motion, which grows behind step {steps}", symmetric
+            )
+        )
+    compliance, motions, tractions, total = ((values[:steps].T / scale).T for values in histories)
+    motions[:, fixed] = prescribed_columns[:, fixed]
+    total[:, free] = pulls[:, free]
+
+    # The unit force is checked first, then the right-hand side.
+    for column in reversed(range(motions.shape[-1])):
+        _check_motion(
+            blocks, motions[..., column], tractions[..., column], total[..., column], symmetric
+        )
+    return compliance, motions[..., 0], tractions[..., 0], total[..., 0]
+
+
+def _solve_frequencies(
+    blocks: CompressedBlocks,
+    circle: NDArray,
+    fixed: Mask,
+    units: Indices,
+    u: NDArray,
+    loads: NDArray,
+    *,
+    symmetric: bool,
+) -> tuple[NDArray, NDArray]:
+    """Solve at every frequency, for the right-hand side and for all unit forces.
+
+    Args:
+        blocks: those of the body.
+        circle: (f,), the frequencies, places on the circle.
+        fixed: (2n,), which unknowns are prescribed.
+        units: numbers of the m unknowns on which unit forces act.
+        u: (f, 2n, 1 or 2), increments of the fixed unknowns of the right-hand side and of the unit
+            force in the middle, where there is one; becomes all their displacements.
+        loads: (f, 2n, 1 or 2), nodal forces on the free unknowns; becomes all nodal forces.
+        symmetric: which form to solve.
+
+    Returns:
+        W (f, m, m), and the tractions (f, 4n, 1 or 2).
+    """
+    m = len(units)
+    mass = blocks.mesh.mass
+    free = ~fixed
+    kept_columns = np.array([m, m // 2][: u.shape[-1]])
     p = np.empty((len(u), 2 * len(free), len(kept_columns)), complex)
     W = np.empty((len(circle), m, m), complex)
     columns = np.zeros((len(free), m + 1), complex)
     columns[units, np.arange(m)] = 1.0
     for start in range(0, len(circle), BATCH):
         powers = circle[start : start + BATCH, None] ** np.arange(blocks.reach)
-        for i, (single, double, hyper) in enumerate(blocks.combined(powers), start):
+        for i, (single, double, hyper) in enumerate(blocks.combine(powers), start):
             z = circle[i]
-            traction, stiffness = _operator(single, double, hyper, mass, z, symmetric)
+            traction, stiffness = _form_operators(single, double, hyper, mass, z, symmetric)
 
             # Free increments after the loads and after unit forces; those of fixed unknowns are
             # known.
             columns[:, -1] = loads[i, :, 0] - stiffness[:, fixed] @ u[i, fixed, 0]
-            moved = np.zeros_like(columns)
+            increments = np.zeros_like(columns)
             if free.any():
                 operator = stiffness[np.ix_(free, free)]
-                moved[free] = solve(operator, columns[free], check_finite=False)
-            u[i, free] = moved[np.ix_(free, kept_columns)]
+                increments[free] = solve(operator, columns[free], check_finite=False)
+            u[i, free] = increments[np.ix_(free, kept_columns)]
             p[i] = traction @ u[i]
             loads[i] = stiffness @ u[i]
 
             # The sum of increments is a division by 1 - z.
             u[i] = u[i] / (1.0 - z)
-            W[i] = moved[units, :-1] / (1.0 - z)
-
-    # Back to the steps, of which there are twice as many as asked for.
-    histories = [np.fft.irfft(values, count, axis=0) for values in (W, u, p, loads)]
-    lost = max(_wrapped_share(values, radius) for values in histories[:2])
-    if not lost <= SHARE:
-        raise StepFailure(
-            _refusal(f"adds {lost:.1e} of the motion, which grows behind step {steps}", symmetric)
-        )
-    compliance, moves, pressed, total = ((values[:steps].T / scale).T for values in histories)
-    moves[:, fixed] = given[:, fixed]
-    total[:, free] = pulls[:, free]
-    for column in reversed(range(len(kept_columns))):
-        _check_motion(
-            blocks, moves[..., column], pressed[..., column], total[..., column], symmetric
-        )
-    return compliance, moves[..., 0], pressed[..., 0], total[..., 0]
+            W[i] = increments[units, :-1] / (1.0 - z)
+    return W, p
 
 
-def _given_columns(
+def _gather_columns(
     forces: Array, fixed: Mask, prescribed: Array | None, one_unit: Indices
 ) -> tuple[Array, Array]:
     """Return nodal forces and prescribed displacements (steps, 2n, 1 or 2) in time.
 
     The first column is the right-hand side. The second one, where there is a unit force to check,
     is this force in step 0.
+
+    Args:
+        forces: (steps, 2n), nodal forces over rho of the right-hand side.
+        fixed: (2n,), which unknowns are prescribed.
+        prescribed: (steps, 2n), displacements of the fixed unknowns [m]; None for zero.
+        one_unit: number of the unknown of the unit force, or none.
     """
     pulls = np.zeros((*forces.shape, 1 + len(one_unit)))
     pulls[..., 0] = forces
     pulls[0, one_unit, 1:] = 1.0
-    given = np.zeros_like(pulls)
+    displacements = np.zeros_like(pulls)
     if prescribed is not None:
-        given[:, fixed, 0] = prescribed[:, fixed]
-    return pulls, given
+        displacements[:, fixed, 0] = prescribed[:, fixed]
+    return pulls, displacements
 
 
-def _operator(
+def _form_operators(
     single: NDArray, double: NDArray, hyper: NDArray, mass: Array, z: complex, symmetric: bool
 ) -> tuple[NDArray, NDArray]:
     """Return the operators of one frequency, from increments of displacement.
@@ -176,6 +217,13 @@ def _check_motion(
     """Raise StepFailure unless a motion satisfies the equations of the march.
 
     It is checked in the middle and at the end.
+
+    Args:
+        blocks: those of the body.
+        u: (steps, 2n), displacements.
+        p: (steps, 4n), tractions over rho.
+        forces: (steps, 2n), nodal forces over rho.
+        symmetric: which form was solved.
     """
     steps = len(u)
     mass = 0.5 * blocks.mesh.mass
@@ -184,20 +232,20 @@ def _check_motion(
     largest_moment = max(np.abs(u @ mass.T).max(), TINY)
     largest_force = max(np.abs(forces).max(), TINY)
     for k in sorted({steps // 2, steps - 1}):
-        single, double, adjoint, hyper = blocks.applied(p[k::-1], changes[k::-1], jumps[k::-1])
+        single, double, adjoint, hyper = blocks.apply(p[k::-1], changes[k::-1], jumps[k::-1])
         nodal = mass.T @ p[k] + adjoint - hyper if symmetric else 2.0 * mass.T @ p[k]
         first_equation = np.abs(single - double - mass @ u[k]).max() / largest_moment
         second_equation = np.abs(nodal - forces[k]).max() / largest_force
         lost = max(first_equation, second_equation)
         if not lost <= SHARE:
             fault = f"misses the equations of step {k + 1} of {steps} by a share of {lost:.1e}"
-            raise StepFailure(_refusal(fault, symmetric))
+            raise StepFailure(_write_refusal(fault, symmetric))
 
 
-def _wrapped_share(values: Array, radius: float) -> float:
+def _estimate_wrapped_share(values: Array, radius: float) -> float:
     """Return which share of the motion wraps around onto the last of N steps.
 
-    It is estimated: growth from N to 2 N steps is taken to go on to 3 N.
+    Growth from N to 2 N steps is taken to go on to 3 N.
     """
     points = len(values)
     largest = np.abs(values.reshape(points, -1)).max(1, initial=0.0)
@@ -207,7 +255,7 @@ def _wrapped_share(values: Array, radius: float) -> float:
     return float(radius**points * (far / near) ** 2) if near else 0.0
 
 
-def _refusal(fault: str, symmetric: bool) -> str:
+def _write_refusal(fault: str, symmetric: bool) -> str:
     """Return the sentence that names the fault and the remedies."""
     other_form = "" if symmetric else " or the symmetric form"
     return (
@@ -228,7 +276,7 @@ def _refuse_drift(blocks: CompressedBlocks, steps: int) -> None:
     translation = np.zeros((steps, 2 * n))
     translation[steps // 2 :, :n] = 1.0
     nothing = np.zeros((steps, 4 * n))
-    _, _, _, hyper = blocks.applied(nothing, translation, nothing)
+    _, _, _, hyper = blocks.apply(nothing, translation, nothing)
     force = np.abs(hyper).max()
     if force * steps * blocks.dt**2 > DRIFT * abs(blocks.mesh.area):
         raise InputError(

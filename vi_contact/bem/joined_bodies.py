@@ -138,19 +138,20 @@ class TwoBodies:
     @cached_property
     def relative(self) -> CondensedCompliance:
         """Return W_1 + W_2 on all interface nodes, in the order and with the normals of body 1."""
-        one = self.one.condensed()
-        two = self._two.condensed()
-        if one.W.shape != two.W.shape or abs(one.dt - two.dt) > 1e-12 * one.dt:
+        first = self.one.condensed()
+        second = self._two.condensed()
+        if first.W.shape != second.W.shape or abs(first.dt - second.dt) > 1e-12 * first.dt:
             raise InputError(
-                f"TwoBodies: {len(one.W)} steps of {one.dt:.6g} s and {len(one.nodes)} nodes face "
-                f"{len(two.W)} of {two.dt:.6g} s and {len(two.nodes)}; give both the same"
+                f"TwoBodies: {len(first.W)} steps of {first.dt:.6g} s and {len(first.nodes)} nodes "
+                f"face {len(second.W)} of {second.dt:.6g} s and {len(second.nodes)}; give both the "
+                "same"
             )
         partner = self._partner
         unknowns = np.concatenate([partner, partner + len(partner)])
         return replace(
-            one,
-            W=one.W + two.W[:, unknowns][:, :, unknowns],
-            u_free=one.u_free - two.u_free[:, unknowns],
+            first,
+            W=first.W + second.W[:, unknowns][:, :, unknowns],
+            u_free=first.u_free - second.u_free[:, unknowns],
         )
 
     @cached_property
@@ -247,16 +248,16 @@ class TwoBodies:
         return self.one.solve(on_one), self._two.solve(on_two)
 
 
-def match_points(points: Array, others: Array) -> Indices:
-    """Return the number of that point of ``others`` (m, 2) which is at each of ``points`` (m, 2).
+def match_points(points: Array, partners: Array) -> Indices:
+    """Return the number of that point of ``partners`` (m, 2) which is at each point (m, 2).
 
     Raises InputError where there is none.
     """
-    distance = np.hypot(*(points[:, None] - others).transpose(2, 0, 1))
+    distance = np.hypot(*(points[:, None] - partners).transpose(2, 0, 1))
     nearest = distance.argmin(axis=1)
     away = distance.min(axis=1)
     worst = int(away.argmax())
-    if len(points) != len(others) or away[worst] > MATCH * np.ptp(points, axis=0).max():
+    if len(points) != len(partners) or away[worst] > MATCH * np.ptp(points, axis=0).max():
         raise InputError(
             f"TwoBodies: the node at {at(points[worst])} has no partner on the other body; give "
             "both interfaces the same nodes"
@@ -306,7 +307,7 @@ class Weld:
 
         # The same of contact unknowns, as if nothing were welded.
         contact_W = W[:, touching][:, :, touching]
-        left = np.concatenate([contact_W, compliance.u_free[:, touching, None]], axis=2)
+        motion = np.concatenate([contact_W, compliance.u_free[:, touching, None]], axis=2)
 
         # Weld forces that bring the welded unknowns to their jumps, step by step, and what they
         # move the contact unknowns by.
@@ -320,11 +321,11 @@ class Weld:
             moved = [
                 sum_products(to_contact[k::-1], self._responses[: k + 1]) for k in range(steps)
             ]
-            left += np.array(moved)
+            motion += np.array(moved)
         self.contact = replace(
             compliance,
-            W=np.ascontiguousarray(left[:, :, :-1]),
-            u_free=np.ascontiguousarray(left[:, :, -1]),
+            W=np.ascontiguousarray(motion[:, :, :-1]),
+            u_free=np.ascontiguousarray(motion[:, :, -1]),
             nodes=compliance.nodes[~nodes],
             points=compliance.points[~nodes],
             normals=compliance.normals[~nodes],

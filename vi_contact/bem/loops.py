@@ -92,7 +92,13 @@ def check_simple(points: Array, after: Indices) -> None:
         )
 
     def side(p: Array, q: Array, x: Array) -> Array:
-        """Return on which side of each segment (p, q) each point x is: the sign of a product."""
+        """Return on which side of each segment each point is: the sign of a product (n, n).
+
+        Args:
+            p: (n, 2), where the segments begin.
+            q: (n, 2), where they end.
+            x: (n, 2), the points.
+        """
         along = (q - p)[:, None]
         away = x - p[:, None]
         return np.asarray(along[..., 0] * away[..., 1] - along[..., 1] * away[..., 0])

@@ -203,7 +203,7 @@ class MultiplierMesh:
         shares[1:] += 0.5 * hyp1f1(2.0, 3.0, -z) * decay  # ∫ x exp(-z x)
         return shares / shares.sum(), q * decay / decay.sum()
 
-    def _tested(self, history: Array, normal: Array) -> Array:
+    def _take_tested(self, history: Array, normal: Array) -> Array:
         """Return the displacements (intervals, 2p, …) that are tested.
 
         Args:
@@ -218,9 +218,9 @@ class MultiplierMesh:
             return np.asarray(ends[-1])
 
         # Along the tangents the sum of the increments of the intervals; along the normals the mean.
-        slid = np.cumsum(np.tensordot(rate, np.diff(ends, axis=0), 1), axis=0)
-        difference = np.tensordot(mean, ends, 1) - slid
-        return np.asarray(slid + np.einsum("ij,kj...->ki...", normal, difference))
+        slips = np.cumsum(np.tensordot(rate, np.diff(ends, axis=0), 1), axis=0)
+        difference = np.tensordot(mean, ends, 1) - slips
+        return np.asarray(slips + np.einsum("ij,kj...->ki...", normal, difference))
 
     def condensed(self) -> CondensedCompliance:
         """Return the compliance that BoundaryContact takes.
@@ -249,9 +249,9 @@ class MultiplierMesh:
             )
 
         # Displacements after a force that is held during the whole first interval.
-        both = np.kron(np.eye(2), B)
-        held = np.cumsum(both.T @ fine.W @ both, axis=0)
-        held[q:] = held[q:] - held[:-q]
+        B_of_components = np.kron(np.eye(2), B)
+        W = np.cumsum(B_of_components.T @ fine.W @ B_of_components, axis=0)
+        W[q:] = W[q:] - W[:-q]
 
         # The mean normal n of each function, and the projection n nᵀ onto it.
         sizes = 0.5 * self._functions.sum(axis=2) * self.mesh.lengths
@@ -262,8 +262,8 @@ class MultiplierMesh:
             [[np.diag(n_x * n_x), np.diag(n_x * n_y)], [np.diag(n_y * n_x), np.diag(n_y * n_y)]]
         )
         return CondensedCompliance(
-            W=self._tested(held, onto),
-            u_free=self._tested(fine.u_free @ both, onto),
+            W=self._take_tested(W, onto),
+            u_free=self._take_tested(fine.u_free @ B_of_components, onto),
             nodes=np.arange(len(n)),
             points=B.T @ fine.points,
             normals=n,
@@ -278,8 +278,8 @@ class MultiplierMesh:
         """
         to_nodes = np.kron(np.eye(2), self.pairing.T)
         shape = (len(self.compliance.W) // self.interval, len(to_nodes))
-        given = array("MultiplierMesh.forces", "forces", forces, shape, unit="N/m")
-        return np.repeat(given @ to_nodes, self.interval, axis=0)
+        checked_forces = array("MultiplierMesh.forces", "forces", forces, shape, unit="N/m")
+        return np.repeat(checked_forces @ to_nodes, self.interval, axis=0)
 
     def averaged(self, motion: Callable[[float], float | Array]) -> Callable[[float], Array]:
         """Return the mean of an obstacle's ``motion`` over the interval that ends at t.

@@ -185,7 +185,7 @@ class PoincareSteklov:
         jumps = np.diff(p, axis=0, prepend=0.0)
         half = 0.5 * self.mesh.mass.T
         if isinstance(self.blocks, CompressedBlocks):
-            _, _, adjoint, hyper = self.blocks.applied(p[::-1], changes[::-1], jumps[::-1])
+            _, _, adjoint, hyper = self.blocks.apply(p[::-1], changes[::-1], jumps[::-1])
             return np.asarray(half @ p[-1] + adjoint - hyper)
         latest_first = slice(len(u) - 1, None, -1)
         adjoint = sum_products(self.blocks.double[latest_first].swapaxes(1, 2), jumps[..., None])
@@ -220,11 +220,13 @@ class PoincareSteklov:
         columns = np.zeros((len(forces), 2 * len(self.mesh), len(unknowns) + 1))
         columns[0, unknowns, np.arange(len(unknowns))] = 1.0 / self.rho
         columns[:, :, -1] = pulls
-        given = None
+        prescribed_columns = None
         if prescribed is not None:
-            given = np.zeros_like(columns)
-            given[:, :, -1] = prescribed
-        u, _, _ = march_blocks(self.blocks, fixed, columns, given, symmetric=self.symmetric)
+            prescribed_columns = np.zeros_like(columns)
+            prescribed_columns[:, :, -1] = prescribed
+        u, _, _ = march_blocks(
+            self.blocks, fixed, columns, prescribed_columns, symmetric=self.symmetric
+        )
         after_units = u[:, unknowns, :-1]
         if not self.symmetric:
             _refuse_growth(after_units)
@@ -384,7 +386,9 @@ class BoundaryProblem:
             )
         return np.flatnonzero(self.operator.mesh.nodes_of(self.contact))
 
-    def _given(self, contact_forces: ArrayLike | None = None) -> tuple[Array, Mask, Array | None]:
+    def _gather_loads(
+        self, contact_forces: ArrayLike | None = None
+    ) -> tuple[Array, Mask, Array | None]:
         """Return what the operator asks for: forces, fixed unknowns (2n,), their motion.
 
         The forces (steps, pieces of a step, 2n) are those of the loads and of contact; the motion
@@ -395,10 +399,10 @@ class BoundaryProblem:
         forces = np.array(self.forces, float).reshape(steps, -1, 2, n)
         if contact_forces is not None:
             shape = (steps, 2 * len(self.contact_nodes))
-            given = array(
+            checked_forces = array(
                 "BoundaryProblem.solve", "contact_forces", contact_forces, shape, unit="N/m"
             )
-            forces[..., self.contact_nodes] += given.reshape(steps, 1, 2, -1)
+            forces[..., self.contact_nodes] += checked_forces.reshape(steps, 1, 2, -1)
         fixed = np.zeros((2, n), bool) if self.fixed is None else np.asarray(self.fixed, bool)
         prescribed = None
         if self.prescribed is not None:
@@ -410,7 +414,7 @@ class BoundaryProblem:
 
         The contact forces are ordered as in CondensedCompliance; None is for no contact.
         """
-        u, p, forces = self.operator.motion(*self._given(contact_forces))
+        u, p, forces = self.operator.motion(*self._gather_loads(contact_forces))
         n = len(self.operator.mesh)
         return BoundaryMotion(
             times=self.times,
@@ -425,7 +429,7 @@ class BoundaryProblem:
         nodes = self.contact_nodes
         elements = np.asarray(self.contact, bool)
         unknowns = np.concatenate([nodes, nodes + len(mesh)])
-        W, u_free = self.operator.condense(*self._given(), unknowns)
+        W, u_free = self.operator.condense(*self._gather_loads(), unknowns)
         return CondensedCompliance(
             W=W,
             u_free=u_free,

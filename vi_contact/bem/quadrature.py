@@ -29,7 +29,7 @@ from ..core.algebra import Array, Indices
 from ..core.arguments import check_fields
 from ..core.quantities import Between
 from .element_pairs import ElementPairs
-from .rules import Rule, gauss, graded_rule, pieces, place_rule, roots, smoothed_rule
+from .rules import Rule, gauss, grade_rule, pieces, place_rule, roots, smooth_rule
 
 MOST_POINTS = 200  # Gauss points a rule may have
 CHUNK = 40_000  # points evaluated at once: keeps the arrays in the cache
@@ -152,25 +152,25 @@ def point_sets(
     apart = reached & ~pairs.same & ~pairs.corner & ~pairs.close
     smooth = apart & ~crossed
     fine = pairs.near | just_passed
-    yield from _product_points(pairs, np.flatnonzero(smooth & ~fine), orders.far)
-    yield from _product_points(pairs, np.flatnonzero(smooth & fine), orders.near)
-    outer = smoothed_rule(orders.outer)
-    inner = smoothed_rule(orders.inner)
-    yield from _split_points(pairs, np.flatnonzero(apart & crossed), fronts, outer, inner)
+    yield from _place_products(pairs, np.flatnonzero(smooth & ~fine), orders.far)
+    yield from _place_products(pairs, np.flatnonzero(smooth & fine), orders.near)
+    outer = smooth_rule(orders.outer)
+    inner = smooth_rule(orders.inner)
+    yield from _place_split(pairs, np.flatnonzero(apart & crossed), fronts, outer, inner)
 
     # Elements that face each other: split about the feet as well, whether a front crosses or not.
     facing = reached & pairs.close & ~pairs.corner
-    rule = smoothed_rule(orders.close)
-    yield from _split_points(pairs, np.flatnonzero(facing), fronts, rule, rule, close=True)
+    rule = smooth_rule(orders.close)
+    yield from _place_split(pairs, np.flatnonzero(facing), fronts, rule, rule, close=True)
 
     # Elements that touch.
-    yield from _points_of_one_element(pairs, np.flatnonzero(pairs.same), fronts, orders.touching)
+    yield from _place_on_one_element(pairs, np.flatnonzero(pairs.same), fronts, orders.touching)
     for sharp in (False, True):
         corner = np.flatnonzero(pairs.corner & (pairs.close == sharp))
-        yield from _corner_points(pairs, corner, fronts, orders.touching, sharp=sharp)
+        yield from _place_at_corners(pairs, corner, fronts, orders.touching, sharp=sharp)
 
 
-def _product_points(pairs: ElementPairs, chosen: Indices, order: int) -> Iterator[PointSet]:
+def _place_products(pairs: ElementPairs, chosen: Indices, order: int) -> Iterator[PointSet]:
     """Yield the products of two Gauss rules on the chosen pairs, in equal blocks."""
     x, w = gauss(order)
     xi = np.repeat(x, order)
@@ -185,16 +185,25 @@ def _product_points(pairs: ElementPairs, chosen: Indices, order: int) -> Iterato
         yield PointSet(part, None, d, np.hypot(*d), xi, eta, weight)
 
 
-def _point_set(
+def _make_point_set(
     pairs: ElementPairs, chosen: Indices, owner: Indices, xi: Array, eta: Array, weight: Array
 ) -> PointSet:
-    """Return points (m,) whose owners are numbered among the chosen pairs."""
+    """Return points (m,) whose owners are numbered among the chosen pairs.
+
+    Args:
+        pairs: the pairs of elements.
+        chosen: (p,), numbers of the chosen pairs.
+        owner: (m,), which of these a point belongs to.
+        xi: (m,), place on the first element.
+        eta: (m,), place on the second element.
+        weight: (m,), of the point.
+    """
     pair = chosen[owner]
     d = pairs.offset[:, pair] + pairs.a[:, pair] * xi - pairs.b[:, pair] * eta
     return PointSet(chosen, owner, d, np.hypot(*d), xi, eta, weight)
 
 
-def _split_points(
+def _place_split(
     pairs: ElementPairs,
     chosen: Indices,
     fronts: Sequence[float],
@@ -208,22 +217,38 @@ def _split_points(
     The outer integral is split where fronts reach the second element's ends or graze it. The inner
     integral is split at the fronts. If ``close``, both are split about the feet as well, and
     stretched there.
+
+    Args:
+        pairs: the pairs of elements.
+        chosen: numbers of the pairs that are integrated.
+        fronts: distances of the kinks [m].
+        outer: rule of each piece of the first element.
+        inner: rule of each piece of the second element.
+        close: whether the elements face each other.
     """
     for start in range(0, len(chosen), SPLIT_PAIRS):
         part = chosen[start : start + SPLIT_PAIRS]
         owner, xi, weight = _place_outer(pairs, part, fronts, outer, close)
         row, eta, weight = _place_inner(pairs, part[owner], xi, weight, fronts, inner, close)
-        yield _point_set(pairs, part, owner[row], xi[row], eta, weight)
+        yield _make_point_set(pairs, part, owner[row], xi[row], eta, weight)
 
 
 def _place_outer(
     pairs: ElementPairs, part: Indices, fronts: Sequence[float], rule: Rule, close: bool
 ) -> tuple[Indices, Array, Array]:
-    """Return (pair in ``part``, xi, weight) of the points on the first elements."""
-    breaks = _outer_breaks(pairs, part, fronts)
+    """Return (pair in ``part``, xi, weight) of the points on the first elements.
+
+    Args:
+        pairs: the pairs of elements.
+        part: numbers of some pairs.
+        fronts: distances of the kinks [m].
+        rule: of each piece.
+        close: whether to split and stretch about the feet.
+    """
+    breaks = _find_outer_breaks(pairs, part, fronts)
     if close:
         # Every piece is stretched about that foot which is the nearer one to its middle.
-        feet, heights = _feet(pairs, part)
+        feet, heights = _find_feet(pairs, part)
         between_feet = feet.mean(axis=1, keepdims=True)
         row, low, length = pieces(np.concatenate([breaks, feet, between_feet], axis=1))
         middle = (low + 0.5 * length)[:, None]
@@ -285,7 +310,7 @@ def _place_inner(
     return np.repeat(row, points_of_rule), eta.ravel(), weight.ravel()
 
 
-def _feet(pairs: ElementPairs, part: Indices) -> tuple[Array, Array]:
+def _find_feet(pairs: ElementPairs, part: Indices) -> tuple[Array, Array]:
     """Return the feet of the second element's ends on the line of the first, and their heights.
 
     Both are (p, 2), in lengths of the first element.
@@ -299,7 +324,7 @@ def _feet(pairs: ElementPairs, part: Indices) -> tuple[Array, Array]:
     return np.stack(feet, axis=1), np.stack(heights, axis=1)
 
 
-def _outer_breaks(pairs: ElementPairs, part: Indices, fronts: Sequence[float]) -> Array:
+def _find_outer_breaks(pairs: ElementPairs, part: Indices, fronts: Sequence[float]) -> Array:
     """Return the places xi (p, 6 per front) where the first element is a front away.
 
     The distance is that from an end of the second element, or from its line.
@@ -325,16 +350,22 @@ def _outer_breaks(pairs: ElementPairs, part: Indices, fronts: Sequence[float]) -
     return np.concatenate(breaks, axis=1) if breaks else np.empty((len(part), 0))
 
 
-def _points_of_one_element(
+def _place_on_one_element(
     pairs: ElementPairs, chosen: Indices, fronts: Sequence[float], order: int
 ) -> Iterator[PointSet]:
     """Yield points of elements with themselves, in z = |xi - eta|, on which alone r depends.
 
     The integral over z is split at the fronts. Across, at one z, shape functions are quadratic and
     the kernel is constant: two points are exact.
+
+    Args:
+        pairs: the pairs of elements.
+        chosen: numbers of the pairs of an element with itself.
+        fronts: distances of the kinks [m].
+        order: Gauss points of a piece.
     """
-    row, low, length = _reached_pieces(np.hypot(*pairs.a[:, chosen]), fronts)
-    x, w = graded_rule(order)
+    row, low, length = _cut_reached_pieces(np.hypot(*pairs.a[:, chosen]), fronts)
+    x, w = grade_rule(order)
     across, across_weight = gauss(2)
     z = (low[:, None] + length[:, None] * x)[:, :, None]
     small = (1.0 - z) * across
@@ -343,7 +374,7 @@ def _points_of_one_element(
     owner = np.repeat(row, 2 * order)
 
     # Both halves of the square: xi > eta, then xi < eta.
-    yield _point_set(
+    yield _make_point_set(
         pairs,
         chosen,
         np.tile(owner, 2),
@@ -353,7 +384,7 @@ def _points_of_one_element(
     )
 
 
-def _reached_pieces(distance: Array, fronts: Sequence[float]) -> tuple[Indices, Array, Array]:
+def _cut_reached_pieces(distance: Array, fronts: Sequence[float]) -> tuple[Indices, Array, Array]:
     """Return the pieces of [0, 1], as ``pieces`` does, that the last front has reached.
 
     Here r is the place in [0, 1] times a distance (p,) [m].
@@ -363,15 +394,22 @@ def _reached_pieces(distance: Array, fronts: Sequence[float]) -> tuple[Indices, 
     return row[reached], low[reached], length[reached]
 
 
-def _corner_points(
+def _place_at_corners(
     pairs: ElementPairs, chosen: Indices, fronts: Sequence[float], order: int, *, sharp: bool
 ) -> Iterator[PointSet]:
     """Yield points of elements with a common corner, at distances u and u w from it (Duffy).
 
     The square is cut along its diagonal: in one half the first element has u and the second u w,
     in the other half it is the other way round. Then r = u R(w), and the inner integral over u is
-    split at fronts / R(w). ``sharp`` says that R(w) falls to a small share of its greatest value
-    at the foot of one end on the other element.
+    split at fronts / R(w).
+
+    Args:
+        pairs: the pairs of elements.
+        chosen: numbers of the pairs with a common corner.
+        fronts: distances of the kinks [m].
+        order: Gauss points of a piece.
+        sharp: whether R(w) falls to a small share of its greatest value, at the foot of one end on
+            the other element.
     """
     if not len(chosen):
         return
@@ -383,8 +421,8 @@ def _corner_points(
     b = -pairs.b[:, chosen] * from_corner
     height = np.abs(a[0] * b[1] - a[1] * b[0])
     halves = [
-        _half_of_corner(a, b, height, fronts, order, sharp=sharp),
-        _half_of_corner(b, a, height, fronts, order, sharp=sharp),
+        _place_half_of_corner(a, b, height, fronts, order, sharp=sharp),
+        _place_half_of_corner(b, a, height, fronts, order, sharp=sharp),
     ]
     owner = np.concatenate([half.owner for half in halves])
     along_first = np.concatenate([halves[0].long, halves[1].short])
@@ -395,7 +433,7 @@ def _corner_points(
     end = at_end[owner]
     xi = np.where(end, 1.0 - along_first, along_first)
     eta = np.where(end, along_second, 1.0 - along_second)
-    yield _point_set(pairs, chosen, owner, xi, eta, weight)
+    yield _make_point_set(pairs, chosen, owner, xi, eta, weight)
 
 
 @dataclass(frozen=True)
@@ -415,7 +453,7 @@ class _HalfOfCorner:
     weight: Array
 
 
-def _half_of_corner(
+def _place_half_of_corner(
     of_u: Array,
     of_uw: Array,
     height: Array,
@@ -444,15 +482,15 @@ def _half_of_corner(
     cuts.append(foot[:, None] if sharp else np.empty((len(foot), 0)))
     row, low, length = pieces(np.concatenate(cuts, axis=1))
     about = (foot[row], (height / c2)[row]) if sharp else None
-    w, w_weight = place_rule(low, length, smoothed_rule(order), about=about)
+    w, w_weight = place_rule(low, length, smooth_rule(order), about=about)
     owner = np.repeat(row, order)
     w = w.ravel()
     w_weight = w_weight.ravel()
 
     # Inner integral over u, cut at fronts / R(w); u is the Jacobian of Duffy's coordinates.
     distance = np.sqrt(c0[owner] - 2.0 * w * ab[owner] + w**2 * c2[owner])
-    row, low, length = _reached_pieces(distance, fronts)
-    u, u_weight = place_rule(low, length, graded_rule(order), w_weight[row])
+    row, low, length = _cut_reached_pieces(distance, fronts)
+    u, u_weight = place_rule(low, length, grade_rule(order), w_weight[row])
     return _HalfOfCorner(
         owner=np.repeat(owner[row], order),
         long=u.ravel(),

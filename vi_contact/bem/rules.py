@@ -23,8 +23,8 @@ def gauss(n: int) -> Rule:
 
 
 @lru_cache
-def smoothed_rule(n: int) -> Rule:
-    """Return the Gauss rule after the substitution w²(3 - 2w).
+def smooth_rule(n: int) -> Rule:
+    """Smooth the Gauss rule by the substitution w²(3 - 2w).
 
     It makes square roots and logarithms at both ends harmless.
     """
@@ -33,10 +33,10 @@ def smoothed_rule(n: int) -> Rule:
 
 
 @lru_cache
-def graded_rule(n: int) -> Rule:
-    """Return the Gauss rule after the substitution w³(10 - 15w + 6w²).
+def grade_rule(n: int) -> Rule:
+    """Grade the Gauss rule towards both ends by the substitution w³(10 - 15w + 6w²).
 
-    It lies more closely at the ends than ``smoothed_rule``, for the logarithm at r = 0.
+    It lies more closely at the ends than ``smooth_rule``, for the logarithm at r = 0.
     """
     x, w = gauss(n)
     return x**3 * (10.0 - 15.0 * x + 6.0 * x**2), 30.0 * w * (x * (1.0 - x)) ** 2

@@ -44,30 +44,32 @@ def tail(
     if start >= steps:
         return np.empty(0, int), np.empty((0, 0)), np.zeros(3)
     reach = (start - 1) * dt * speeds[1] - h
-    table = _radial_functions(reach * _places(SAMPLES), start, steps, dt, speeds)
+    table = _evaluate_radial_functions(reach * _place_samples(SAMPLES), start, steps, dt, speeds)
 
     # Interpolative decomposition: a QR factorisation with pivots of the table, each function over
     # its greatest value, puts the steps that tell most in front. R gives the others by them.
     flat = (table / np.abs(table).max((0, 2))[:, None]).reshape(len(table), -1)
     r, order = qr(flat.T, mode="r", pivoting=True, check_finite=False)
     rank = int(np.count_nonzero(np.abs(np.diag(r)) > SHARE * np.abs(r[0, 0])))
-    others = solve_triangular(r[:rank, :rank], r[:rank, rank:]).T
-    weights = np.concatenate([np.eye(rank), others])[np.argsort(order)]
+    weights_of_others = solve_triangular(r[:rank, :rank], r[:rank, rank:]).T
+    weights = np.concatenate([np.eye(rank), weights_of_others])[np.argsort(order)]
     weights += (1.0 - weights.sum(1))[:, None] / rank
-    kept = order[:rank]
+    chosen = order[:rank]
 
     # What is lost is measured at other places than the samples.
-    check = _radial_functions(reach * _places(3 * SAMPLES + 1), start, steps, dt, speeds)
-    lost = np.abs(check - np.tensordot(weights, check[kept], 1)).max((0, 2))
-    return start + kept, weights, _bounds(lost, speeds[1] ** 2, h)
+    check = _evaluate_radial_functions(
+        reach * _place_samples(3 * SAMPLES + 1), start, steps, dt, speeds
+    )
+    lost = np.abs(check - np.tensordot(weights, check[chosen], 1)).max((0, 2))
+    return start + chosen, weights, _bound_errors(lost, speeds[1] ** 2, h)
 
 
-def _places(count: int) -> Array:
+def _place_samples(count: int) -> Array:
     """Return Chebyshev's places (count,) in [0, 1]."""
     return np.sin(0.5 * np.pi * (np.arange(count) + 0.5) / count) ** 2
 
 
-def _bounds(lost: Array, mu: float, h: float) -> Array:
+def _bound_errors(lost: Array, mu: float, h: float) -> Array:
     """Return the bounds (3,) of the errors of entries of V, K and D.
 
     An entry is an integral over two elements of at most the length h, whose shape functions are at
@@ -94,12 +96,19 @@ def _bounds(lost: Array, mu: float, h: float) -> Array:
     return np.array(bounds)
 
 
-def _radial_functions(
+def _evaluate_radial_functions(
     r: Array, start: int, steps: int, dt: float, speeds: tuple[float, float]
 ) -> Array:
     """Return the radial functions of the blocks (steps, 14, points) at distances r (points,) [m].
 
     The kernels are homogeneous in r and t: those at t = 1 and r/t give all others.
+
+    Args:
+        r: (points,), distances [m].
+        start: first step.
+        steps: the step behind the last one.
+        dt: time step [s].
+        speeds: (c_P, c_S) [m/s].
     """
     t = dt * np.arange(start - 1, steps + 1)[:, None]
     q = r / t

@@ -21,7 +21,7 @@ from ..core.algebra import Array
 from ..core.arguments import check_fields
 from ..core.quantities import NotNegative, Positive, Unit
 
-# of PeriodicBar: u = c0 + c1 x + c2 s in [phase][zone]
+# (c0, c1, c2) of PeriodicBar, u = c0 + c1 x + c2 s, in [phase][zone]
 _PERIOD_THREE = 0.5 * np.array(
     [
         [(1, -1, 0), (1, 0, -1), (1, -1, 0), (1, 0, -1)],  # released
@@ -35,7 +35,11 @@ _PERIOD_THREE = 0.5 * np.array(
 class UprightBar:
     """Hold what upright bars have in common.
 
-    That is length, height above the wall, E, rho.
+    Attributes:
+        length: of the bar without stress.
+        E: Young's modulus.
+        rho: mass density.
+        height: of its foot above the wall at the start.
     """
 
     length: Annotated[float, Positive, Unit("m")] = 10.0
@@ -96,24 +100,27 @@ class ThrownBar(UprightBar):
     def displacement(self, x: ArrayLike, t: ArrayLike) -> Array:
         """Return u(x, t) [m]."""
         delay, s = self._times(x, t)
-        return -self.height - self.speed * np.minimum(
-            delay, self.crossing - np.abs(s - self.crossing)
-        )
+        front = self.crossing - np.abs(s - self.crossing)
+        return -self.height - self.speed * np.minimum(delay, front)
 
     def velocity(self, x: ArrayLike, t: ArrayLike) -> Array:
         """Return u_t(x, t) [m/s]: -v0 ahead of the wave, 0 behind it, v0 behind its reflection."""
         delay, s = self._times(x, t)
-        return self.speed * ((s > delay) * 1.0 + (s > 2.0 * self.crossing - delay) - 1.0)
+        behind_wave = np.where(s > delay, 1.0, 0.0)
+        behind_reflection = np.where(s > 2.0 * self.crossing - delay, 1.0, 0.0)
+        return self.speed * (behind_wave + behind_reflection - 1.0)
 
     def strain(self, x: ArrayLike, t: ArrayLike) -> Array:
         """Return u_x(x, t): -v0/c behind the wave and ahead of its reflection, else 0."""
         delay, s = self._times(x, t)
-        return -self.speed / self.wave_speed * ((s > delay) & (s < 2.0 * self.crossing - delay))
+        between = (s > delay) & (s < 2.0 * self.crossing - delay)
+        return -np.where(between, self.speed / self.wave_speed, 0.0)
 
     def force(self, t: ArrayLike) -> Array:
         """Return the contact pressure p(t) [Pa] >= 0."""
         t = np.asarray(t, dtype=float)
-        return self.pressure * ((t > self.contact_start) & (t < self.contact_end))
+        touches = (t > self.contact_start) & (t < self.contact_end)
+        return self.pressure * np.where(touches, 1.0, 0.0)
 
     def contacts(self, until: float) -> Array:
         """Return start and end of the contacts before `until` [s].
@@ -125,9 +132,8 @@ class ThrownBar(UprightBar):
 
     def _times(self, x: ArrayLike, t: ArrayLike) -> tuple[Array, Array]:
         """Return x/c and the time since touch-down [s]."""
-        return np.asarray(x, dtype=float) / self.wave_speed, np.asarray(
-            t, dtype=float
-        ) - self.contact_start
+        delay = np.asarray(x, dtype=float) / self.wave_speed
+        return delay, np.asarray(t, dtype=float) - self.contact_start
 
 
 @dataclass(frozen=True)
@@ -149,21 +155,23 @@ class PeriodicBar:
 
     def displacement(self, x: ArrayLike, t: ArrayLike) -> Array:
         """Return u(x, t) [m]."""
-        x, s, table = self._zones(x, t)
-        return table[..., 0] + table[..., 1] * x + table[..., 2] * s
+        x, s, coefficients = self._zones(x, t)
+        return coefficients[..., 0] + coefficients[..., 1] * x + coefficients[..., 2] * s
 
     def velocity(self, x: ArrayLike, t: ArrayLike) -> Array:
         """Return u_t(x, t) [m/s]: -1/2, 0 or 1/2."""
-        return self._zones(x, t)[2][..., 2]
+        _, _, coefficients = self._zones(x, t)
+        return coefficients[..., 2]
 
     def strain(self, x: ArrayLike, t: ArrayLike) -> Array:
         """Return u_x(x, t): -1/2, 0 or 1/2."""
-        return self._zones(x, t)[2][..., 1]
+        _, _, coefficients = self._zones(x, t)
+        return coefficients[..., 1]
 
     def force(self, t: ArrayLike) -> Array:
         """Return the contact pressure p(t) [Pa]: 1/2 in the second third of a period, else 0."""
         phase = np.floor(np.mod(np.asarray(t, dtype=float), 3.0))
-        return 0.5 * (phase == 1.0)
+        return 0.5 * np.where(phase == 1.0, 1.0, 0.0)
 
     def contacts(self, until: float) -> Array:
         """Return start and end of the contacts before `until` [s].
@@ -179,4 +187,7 @@ class PeriodicBar:
         x, t = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(t, dtype=float))
         phase = np.floor(np.mod(t, 3.0)).astype(int)
         s = np.mod(t, 1.0)
-        return x, s, _PERIOD_THREE[phase, 2 * (s > 1.0 - x) + (s > x)]
+
+        # Zones 0 to 3: whether s is above x, and twice whether it is above 1 - x.
+        zone = np.where(s > 1.0 - x, 2, 0) + np.where(s > x, 1, 0)
+        return x, s, _PERIOD_THREE[phase, zone]

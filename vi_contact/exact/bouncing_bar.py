@@ -41,8 +41,8 @@ class BouncingBar(UprightBar):
 
     The fall takes t_f = sqrt(2 height/g). For integer t_f/T >= 3 the motion is periodic, 4T + 4t_f,
     and the first contact, of length 2T, has p = rho c g (t_f + r), r the time since touch-down; the
-    second has it in reverse. Methods take t >= 0; where
-    velocity and pressure jump they return the later value.
+    second has it in reverse. Methods take t >= 0; where velocity and pressure jump they return the
+    later value.
     """
 
     gravity: Annotated[float, Positive, Unit("m/s²")] = 10.0
@@ -112,29 +112,28 @@ class BouncingBar(UprightBar):
         return np.minimum(times[times[:, 0] < until], until)
 
     def _waves(self, x: ArrayLike, t: ArrayLike) -> tuple[Array, Array, Array]:
-        """Return t, and (F, F', in contact) at t - x/c and at t - 2T + x/c."""
+        """Return t, and (F, F', in contact) at t - x/c, upwards, and at t - 2T + x/c, downwards."""
         delay = np.asarray(x, dtype=float) / self.wave_speed
         t = np.asarray(t, dtype=float)
         start, wave, closed = self._history(float(np.max(t, initial=0.0)))
 
-        def at(s: Array) -> Array:
+        def evaluate(s: Array) -> Array:
+            """Return F, F' and 1.0 in contact at arguments s [s], of the pieces they lie in."""
             piece = np.maximum(np.searchsorted(start, s, side="right") - 1, 0)
             value, slope, curvature = np.moveaxis(wave[piece], -1, 0)
             after = s - start[piece]
-            return np.stack(
-                [
-                    value + (slope + 0.5 * curvature * after) * after,
-                    slope + curvature * after,
-                    closed[piece],
-                ]
-            )
+            F = value + (slope + 0.5 * curvature * after) * after
+            return np.stack([F, slope + curvature * after, closed[piece]])
 
-        return t, at(np.asarray(t - delay)), at(np.asarray(t - 2.0 * self.crossing + delay))
+        up = evaluate(np.asarray(t - delay))
+        down = evaluate(np.asarray(t - 2.0 * self.crossing + delay))
+        return t, up, down
 
     def _history(self, until: float) -> tuple[Array, Array, Array]:
-        """Return pieces of F.
+        """Return the pieces of F up to a time [s].
 
-        They have starts (m,) [s]; value, slope and curvature there (m, 3); and 1.0 in contact (m,).
+        They are their starts (m,) [s]; value, slope and curvature there (m, 3); and 1.0 for those
+        in contact (m,).
         """
         return _pieces(self, 1 + math.ceil(until / (2.0 * self.crossing)))
 
@@ -149,6 +148,8 @@ def _pieces(bar: BouncingBar, round_trips: int) -> tuple[Array, Array, Array]:
     g = bar.gravity
     near = COINCIDENT * (bar.height + g * trip**2)
     slow = COINCIDENT * g * (bar.fall_time + trip)
+
+    # From event to event, a piece each. Before t = 0 there is one without motion.
     start = [-trip]
     wave = [(0.0, 0.0, 0.0)]
     closed = [False]
@@ -156,6 +157,7 @@ def _pieces(bar: BouncingBar, round_trips: int) -> tuple[Array, Array, Array]:
     y = bar.height
     delayed = 0  # the piece that holds t - 2T
     while t < round_trips * trip:
+        # The piece that comes back from the top now, its value and slope at t - 2T, and its end.
         while delayed + 1 < len(start) and start[delayed + 1] + trip <= t + COINCIDENT * trip:
             delayed += 1
         end = (start[delayed + 1] if delayed + 1 < len(start) else t) + trip
@@ -163,31 +165,40 @@ def _pieces(bar: BouncingBar, round_trips: int) -> tuple[Array, Array, Array]:
         after = t - trip - start[delayed]
         value = value + (slope + 0.5 * curvature * after) * after
         slope = slope + curvature * after
-        # the free foot's velocity and acceleration
+
+        # Velocity and acceleration of a free foot; what is round-off is zero.
         a = 2.0 * slope - g * t
         a1 = 2.0 * curvature - g
         y = 0.0 if y <= near else y
         a = 0.0 if abs(a) <= slow else a
         touching = y == 0.0 and (a < 0.0 or (a == 0.0 and a1 < 0.0))
+
+        # F of the new piece, by y' = 0 of a foot that touches or p = 0 of a free one, and the event
+        # that ends it: release or touch-down.
         fall = bar.height - 0.5 * g * t**2  # where the foot would be without F
         start.append(t)
         closed.append(touching)
         if touching:
             wave.append((-fall - value, g * t - slope, g - curvature))
-            event = t - a / a1 if a1 > 0.0 else math.inf  # a grows to zero: release
+            event = t - a / a1 if a1 > 0.0 else math.inf  # a grows to zero
         else:
             wave.append((y - fall - value, slope, curvature))
-            event = t + first_root(y, a, a1)
+            event = t + find_first_root(y, a, a1)
+
+        # Go on to it, or to the end of the piece that comes back.
         step = (event if event < end - COINCIDENT * trip else end) - t
         t += step
         y = 0.0 if touching or t == event else y + (a + 0.5 * a1 * step) * step
     return np.array(start), np.array(wave), np.array(closed, dtype=float)
 
 
-def first_root(y: float, a: float, a1: float) -> float:
-    """Return the first s > 0 at which y + a s + a1 s²/2is zero.
+def find_first_root(y: float, a: float, a1: float) -> float:
+    """Return the first s > 0 at which y + a s + a1 s²/2 is zero, or infinity if there is none.
 
-    It is positive before; s is infinite if there is none.
+    Args:
+        y: value at s = 0, zero or more.
+        a: slope at s = 0.
+        a1: curvature.
     """
     disc = a * a - 2.0 * a1 * y
     if disc < 0.0 or (a1 >= 0.0 and a >= 0.0):

@@ -43,10 +43,8 @@ def contact_radius(*radii: float) -> float:
 
     Raises InputError unless the sum of 1/radius is finite and positive.
     """
-    if (
-        any(radius == 0.0 for radius in radii)
-        or not 0.0 < sum(1.0 / radius for radius in radii) < math.inf
-    ):
+    pointed = any(radius == 0.0 for radius in radii)
+    if pointed or not 0.0 < sum(1.0 / radius for radius in radii) < math.inf:
         raise InputError(
             f"contact_radius: {radii} leave no gap that grows away from the contact; "
             "give radii whose sum of 1/radius is positive"
@@ -63,7 +61,10 @@ class HertzPoint:
         a = (3 F R/(4 E*))^(1/3),   p0 = 3 F/(2 pi a²),   p = p0 sqrt(1 - r²/a²),
         approach = a²/R,   F = (4/3) E* sqrt(R) approach^(3/2)
 
-    modulus: E*; radius: R.
+    Attributes:
+        force: F, which presses where positive.
+        modulus: E*.
+        radius: R.
     """
 
     force: Annotated[float, Positive, Unit("N")]
@@ -95,7 +96,8 @@ class HertzPoint:
         Raises:
             InputError: a number is not positive.
         """
-        return cls(4.0 / 3.0 * modulus * math.sqrt(radius) * approach**1.5, modulus, radius)
+        force = 4.0 / 3.0 * modulus * math.sqrt(radius) * approach**1.5
+        return cls(force, modulus, radius)
 
     @property
     def contact_radius(self) -> float:
@@ -114,9 +116,8 @@ class HertzPoint:
 
     def pressure(self, r: ArrayLike) -> Array:
         """Return p(r) [Pa] at the distance r from the axis, 0 outside the contact."""
-        return self.peak * np.sqrt(
-            np.maximum(1.0 - (np.asarray(r, dtype=float) / self.contact_radius) ** 2, 0.0)
-        )
+        share = np.asarray(r, dtype=float) / self.contact_radius
+        return self.peak * np.sqrt(np.maximum(1.0 - share**2, 0.0))
 
 
 @dataclass(frozen=True)
@@ -128,8 +129,13 @@ class HertzImpact:
         d_max = (15 m v²/(16 E* sqrt(R)))^(2/5)
         duration = 4 sqrt(pi) Gamma(2/5)/(5 Gamma(9/10)) d_max/v
 
-    (factor 2.9433). It rebounds with v: waves in the bodies are left out. mass: m;
-    speed: v; modulus: E*; radius: R.
+    (factor 2.9433). It rebounds with v: waves in the bodies are left out.
+
+    Attributes:
+        mass: m.
+        speed: v.
+        modulus: E*.
+        radius: R.
     """
 
     mass: Annotated[float, Positive, Unit("kg")]
@@ -143,9 +149,8 @@ class HertzImpact:
     @property
     def approach(self) -> float:
         """Return d_max [m]."""
-        return (
-            15.0 * self.mass * self.speed**2 / (16.0 * self.modulus * math.sqrt(self.radius))
-        ) ** 0.4
+        stiffness = 16.0 * self.modulus * math.sqrt(self.radius)
+        return (15.0 * self.mass * self.speed**2 / stiffness) ** 0.4
 
     @property
     def duration(self) -> float:

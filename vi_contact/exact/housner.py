@@ -31,7 +31,15 @@ class HousnerBlock:
     """Describe a block of width 2b and height 2h (the full lengths) under gravity.
 
     "Slender" is said of what uses the linearised equation; theta0 is the angle of release at rest,
-    in (0, alpha). Raises InputError for blocks that do not rock on after an impact (e <= 0).
+    in (0, alpha).
+
+    Attributes:
+        width: 2b.
+        height: 2h.
+        gravity: g.
+
+    Raises:
+        InputError: a block that does not rock on after an impact (e <= 0).
     """
 
     width: Annotated[float, Positive, Unit("m")]
@@ -105,24 +113,30 @@ class HousnerBlock:
         rest time.
         """
         t = np.asarray(t, dtype=float)
-        # then phi is below REST, from any angle
+
+        # After so many impacts phi is below REST, from any angle. The amplitudes are half way
+        # between impacts.
         impacts = math.ceil(math.log(REST) / math.log(self.energy_ratio))
         phi = self._amplitudes(theta0, impacts)
         ends = self.impact_times(theta0, len(phi) - 1)
         peaks = np.append(0.0, 0.5 * (ends[1:] + ends[:-1]))
+
+        # The lean between the impacts around t, to the side of theta0 and to the other by turns;
+        # cosh - 1 = 2 sinh² of the half.
         n = np.searchsorted(ends, t, side="right")
         last = np.minimum(n, len(peaks) - 1)
         half = np.sinh(0.5 * self.p * np.where(n < len(peaks), t - peaks[last], 0.0))
-        lean = phi[last] - 2.0 * (1.0 - phi[last]) * half**2  # cosh - 1 = 2 sinh² of the half
+        lean = phi[last] - 2.0 * (1.0 - phi[last]) * half**2
         return self.alpha * np.where(n < len(peaks), np.where(n % 2, -lean, lean), 0.0)
 
     def overturning_time(self, acceleration: float) -> float:
-        """Return the shortest rectangular pulse that overturns [s].
+        """Return the length of the shortest rectangular pulse that overturns, slender [s].
 
-        It is a pulse of the base acceleration [m/s²]; the block is slender.
+        It is ln(A/(A - 1))/p, A = acceleration/(g alpha), for a pulse of the base acceleration
+        [m/s²].
 
-        ln(A/(A - 1))/p, A = acceleration/(g alpha). Raises InputError unless A > 1: below that
-        nothing moves.
+        Raises:
+            InputError: A is not above 1; below that nothing moves.
         """
         excess = acceleration / (self.gravity * self.alpha)
         if not excess > 1.0:
@@ -133,6 +147,7 @@ class HousnerBlock:
         return -math.log1p(-1.0 / excess) / self.p
 
     def _phi(self, theta0: float) -> float:
+        """Return theta0/alpha, or raise InputError for a theta0 outside (0, alpha)."""
         if not 0.0 < theta0 < self.alpha:
             raise InputError(
                 f"HousnerBlock: theta0 is {theta0!r}; give one between 0 and alpha = "

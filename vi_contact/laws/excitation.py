@@ -130,6 +130,7 @@ class HalfSine(Pulse):
     """
 
     def _shape(self, t: float) -> float:
+        """Return sin(pi t / duration)."""
         return math.sin(math.pi * t / self.duration)
 
 
@@ -141,6 +142,7 @@ class FullSine(Pulse):
     """
 
     def _shape(self, t: float) -> float:
+        """Return sin(2 pi t / duration)."""
         return math.sin(2.0 * math.pi * t / self.duration)
 
 

@@ -56,7 +56,7 @@ class Unheld:
 
 def floats(equations: Unheld) -> bool:
     """Say whether some rigid motion of a body meets no stiffness. Collective."""
-    return any(body.motions.shape[1] for body in _motions_of(equations))
+    return any(body.motions.shape[1] for body in _find_motions(equations))
 
 
 def free_motions(system: SemiDiscreteSystem) -> Iterator[FreeMotions]:
@@ -67,16 +67,16 @@ def free_motions(system: SemiDiscreteSystem) -> Iterator[FreeMotions]:
     """
     space = system.space
     bodies = np.asarray(space.bodies)
-    return _motions_of(
+    return _find_motions(
         Unheld(system.algebra, system.M, system.K, system.influence, bodies, space.coordinates)
     )
 
 
-def _motions_of(system: Unheld) -> Iterator[FreeMotions]:
+def _find_motions(system: Unheld) -> Iterator[FreeMotions]:
     """Yield the free motions of every body, from its matrices. Collective."""
     comm = system.algebra.comm
-    bodies = _rows_by_body(comm, system.bodies)
-    motions = _rigid_motions_of_bodies(system, bodies)
+    bodies = _group_rows(comm, system.bodies)
+    motions = _make_rigid_motions(system, bodies)
     stiffness = np.abs(system.K.diagonal())[:, None]
     mass = system.M.diagonal()[:, None]
     forces = np.column_stack([system.K @ w for w in motions.T])
@@ -94,16 +94,16 @@ def _motions_of(system: Unheld) -> Iterator[FreeMotions]:
 
 def rows_of_bodies(system: SemiDiscreteSystem) -> list[Indices]:
     """Return the owned unknowns of every body of all ranks. Collective."""
-    return _rows_by_body(system.algebra.comm, np.asarray(system.space.bodies))
+    return _group_rows(system.algebra.comm, np.asarray(system.space.bodies))
 
 
-def _rows_by_body(comm: Comm, numbers: Indices) -> list[Indices]:
+def _group_rows(comm: Comm, numbers: Indices) -> list[Indices]:
     """Return the owned unknowns of every body, given the body of each. Collective."""
     counts = np.bincount(numbers, minlength=count_bodies(comm, numbers))
     return np.split(np.argsort(numbers, kind="stable"), np.cumsum(counts)[:-1])
 
 
-def _rigid_motions_of_bodies(system: Unheld, bodies: list[Indices]) -> Array:
+def _make_rigid_motions(system: Unheld, bodies: list[Indices]) -> Array:
     """Return rigid motions (n, modes) of all bodies at once, each about its middle. Collective.
 
     Bodies share no unknown, so that one vector holds a motion of all of them. Each body moves by
@@ -123,25 +123,26 @@ def _rigid_motions_of_bodies(system: Unheld, bodies: list[Indices]) -> Array:
     motions = amount * rigid_motions(system.influence, place)
 
     # Rotations and other unknowns that no translation moves follow without force.
-    other = ~system.influence.any(axis=1)
-    if largest(comm, other.any()):
-        factor_of_others = _factorise_others(system, other)
+    turning = ~system.influence.any(axis=1)
+    if largest(comm, turning.any()):
+        factor_of_rotations = _factorise_rotations(system, turning)
         for w in motions.T:
-            w[other] = -factor_of_others.solve((system.K @ w)[other])
+            w[turning] = -factor_of_rotations.solve((system.K @ w)[turning])
     return motions
 
 
-def _factorise_others(system: Unheld, other: Mask) -> Factor:
+def _factorise_rotations(system: Unheld, turning: Mask) -> Factor:
     """Return a factor of K for unknowns that are no displacements, also where nothing holds them.
 
-    What holds them is made a little stiffer; what nothing holds gets a stiffness of one.
+    ``turning`` (n,) marks these, which are rotations as a rule. What holds them is made a little
+    stiffer; what nothing holds gets a stiffness of one.
     """
     algebra = system.algebra
-    stiffness = np.abs(system.K.diagonal())[other]
+    stiffness = np.abs(system.K.diagonal())[turning]
     places = np.arange(len(stiffness))
     soft = np.where(stiffness > 0.0, SOFT * stiffness, 1.0)
     shift = algebra.local(places, places, soft, len(places))
-    return algebra.factor(algebra.combine([(1.0, algebra.block(system.K, other)), (1.0, shift)]))
+    return algebra.factor(algebra.combine([(1.0, algebra.block(system.K, turning)), (1.0, shift)]))
 
 
 def _find_kernel(form: Array, size: Array) -> Array:

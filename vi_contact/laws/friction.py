@@ -48,7 +48,13 @@ class Tresca:
         object.__setattr__(self, "threshold", _as_tuple("Tresca", self.threshold))
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
-        """Return threshold · weights · scale, shape (m,)."""
+        """Return threshold · weights · scale, shape (m,).
+
+        Args:
+            r_n: normal reactions (m,), [N] or [N s].
+            weights: nodal weights (m,), areas in space.
+            scale: factor from forces to reactions, 1 or the time step [s].
+        """
         threshold = _spread("Tresca", "threshold", self.threshold, len(weights))
         return threshold * np.asarray(weights, dtype=float) * scale
 
@@ -82,6 +88,11 @@ class Coulomb:
         """Return mu · max(r_n, 0), shape (m,).
 
         Tension, of a held point or on the way to an answer, rubs on nothing.
+
+        Args:
+            r_n: normal reactions (m,), [N] or [N s].
+            weights: nodal weights (m,), areas in space.
+            scale: factor from forces to reactions, 1 or the time step [s].
         """
         return _spread("Coulomb", "mu", self.mu, len(r_n)) * np.maximum(r_n, 0.0)
 
@@ -136,7 +147,13 @@ class SlipRateCoulomb:
         return Coulomb(mu)
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
-        """Return mu(0) · max(r_n, 0), shape (m,): at rest."""
+        """Return mu(0) · max(r_n, 0), shape (m,): at rest.
+
+        Args:
+            r_n: normal reactions (m,), [N] or [N s].
+            weights: nodal weights (m,), areas in space.
+            scale: factor from forces to reactions, 1 or the time step [s].
+        """
         return self.at(np.zeros(len(r_n))).limit(r_n, weights, scale)
 
     def slope(self, weights: Array) -> Array:

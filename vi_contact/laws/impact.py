@@ -110,20 +110,34 @@ class ImpulseUpdate:
 def _update_by_iterations(
     system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
 ) -> Array:
-    """Return v after the impulse: M (v⁺ - v⁻) = 0 off the chosen unknowns. Collective."""
+    """Return v after the impulse: M (v⁺ - v⁻) = 0 off the chosen unknowns. Collective.
+
+    Args:
+        system: the equations that are marched.
+        surface: the contact conditions.
+        v: velocity (n,) [m/s] that the step left.
+        target: wanted normal velocities (m,) [m/s], NaN where they stay as they are.
+    """
     chosen = ~np.isnan(target)
     unknowns = surface.owned[chosen]
-    held = np.zeros(len(v), dtype=bool)
-    held[unknowns] = True
+    prescribed = np.zeros(len(v), dtype=bool)
+    prescribed[unknowns] = True
     jump = np.zeros(len(v))
     jump[unknowns] = (target - surface.normal_values(v))[chosen]
-    return v + solve_free(system.algebra, system.M, np.zeros(len(v)), held, jump)
+    return v + solve_free(system.algebra, system.M, np.zeros(len(v)), prescribed, jump)
 
 
 def _update_condensed(
     system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
 ) -> Array:
-    """Return v after the impulse, which is solved for on every rank. Collective."""
+    """Return v after the impulse, which is solved for on every rank. Collective.
+
+    Args:
+        system: the equations that are marched.
+        surface: the contact conditions.
+        v: velocity (n,) [m/s] that the step left.
+        target: wanted normal velocities (m,) [m/s], NaN where they stay as they are.
+    """
     jump = surface.everywhere(target - surface.normal_values(v))
     chosen: Indices = np.flatnonzero(~np.isnan(jump))
     if len(chosen) == 0:

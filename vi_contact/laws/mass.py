@@ -35,7 +35,13 @@ class ConsistentMass:
     def apply(
         self, system: SemiDiscreteSystem, surface: ContactSurface, *, tangential: bool
     ) -> SemiDiscreteSystem:
-        """Return the system as it is; the arguments are those of ``core.protocols.MassLaw``."""
+        """Return the system as it is, for any arguments of ``core.protocols.MassLaw``.
+
+        Args:
+            system: the equations.
+            surface: the contact conditions.
+            tangential: whether tangential unknowns lose their mass too.
+        """
         return system
 
 
@@ -78,7 +84,13 @@ class Redistributed:
     ) -> SemiDiscreteSystem:
         """Return the system without mass at the contact unknowns.
 
-        The arguments are those of ``core.protocols.MassLaw``.
+        Args:
+            system: the equations.
+            surface: the contact conditions.
+            tangential: whether tangential unknowns lose their mass too.
+
+        Raises:
+            InputError: what the class lists.
         """
         if surface.total == 0:
             return system
@@ -119,14 +131,14 @@ class Redistributed:
         # D of every body, on its nodes off the contact.
         inner = ~(contact | still)
         terms = [(1.0, moved)]
-        for body in _bodies(system, inner):
+        for body in _find_bodies(system, inner):
             terms.append((1.0, _correct_inertia(system, moved, body & inner, body, nodal)))
         M = algebra.combine(terms)
         massless = massless if system.massless is None else massless | system.massless
         return system.changed(M=M, C=C, load=load, massless=massless)
 
 
-def _bodies(system: SemiDiscreteSystem, inner: Mask) -> Iterator[Mask]:
+def _find_bodies(system: SemiDiscreteSystem, inner: Mask) -> Iterator[Mask]:
     """Yield the unknowns (n,) of every body that has inner ones. Collective."""
     comm = system.algebra.comm
     numbers = np.asarray(system.space.bodies)
@@ -198,7 +210,7 @@ def _correct_inertia(
     # the factor sqrt(2) "smallest" does not depend on the axes.
     squares = [x[:, i] * x[:, j] for i in range(d) for j in range(i, d)]
     powers = np.column_stack([np.ones(len(x)), *x.T, *squares])
-    pairs = list(_pairs_of_components(system, inner))
+    pairs = list(_pair_components(system, inner))
     shapes = []
     for i, j in pairs:
         shape = powers[i] @ _orthonormalise(comm, powers[i], nodal[i])
@@ -251,9 +263,7 @@ def _orthonormalise(comm: Comm, powers: Array, nodal: Array) -> Array:
     return np.asarray(vectors[:, independent] / np.sqrt(values[independent]))
 
 
-def _pairs_of_components(
-    system: SemiDiscreteSystem, inner: Mask
-) -> Iterator[tuple[Indices, Indices]]:
+def _pair_components(system: SemiDiscreteSystem, inner: Mask) -> Iterator[tuple[Indices, Indices]]:
     """Yield, for each c <= e, the unknowns c and the unknowns e of inner nodes that have both.
 
     The two are one array where c is e.

@@ -49,15 +49,15 @@ def transfer_to_neighbours(
     # Level by level: unknowns with enough neighbours among the donors are replaced, and become
     # donors for the next ones.
     levels: list[Matrix] = []
-    left = massless.copy()
+    remaining = massless.copy()
     donors = ~contact & ~tied & system.influence.any(axis=1)
     exact = True
-    while largest(algebra.comm, left.any()):
-        tried = left & ~tied if exact else left
+    while largest(algebra.comm, remaining.any()):
+        tried = remaining & ~tied if exact else remaining
         ready, entries = _fit_rows(system, tried, donors, nodal, exact=exact)
         if largest(algebra.comm, len(ready)):
             levels.append(algebra.replaced_rows(system.rows, ready, entries))
-            left[ready] = False
+            remaining[ready] = False
             donors |= contact & np.isin(node, node[ready])
         elif exact:
             # The neighbours that are left are too few to tell a rotation: translations will do.
@@ -72,13 +72,13 @@ def transfer_to_neighbours(
 
 
 def _fit_rows(
-    system: SemiDiscreteSystem, left: Mask, donors: Mask, nodal: Array, *, exact: bool
+    system: SemiDiscreteSystem, massless: Mask, donors: Mask, nodal: Array, *, exact: bool
 ) -> tuple[Indices, sp.csr_matrix]:
     """Return the rows of P of those unknowns that donors can replace. Collective.
 
     Args:
         system: the equations.
-        left: (n,) the unknowns to replace.
+        massless: (n,) the unknowns to replace.
         donors: (n,) the unknowns that may replace them.
         nodal: (n,) the nodal masses.
         exact: whether the donors must be enough to keep every rigid motion.
@@ -86,7 +86,7 @@ def _fit_rows(
     Returns:
         The numbers (k,) of the unknowns, and their rows (k, unknowns of all ranks).
     """
-    unknowns = np.flatnonzero(left)
+    unknowns = np.flatnonzero(massless)
     entries = system.algebra.entries(system.M, unknowns)
     neighbours = _find_neighbours(system, donors, entries.indices)
     weights = neighbours.weights(entries)
@@ -161,9 +161,9 @@ class _Neighbours:
         pairs, pair = np.unique(keys, return_inverse=True)
         squares = entries.data[of_donor] ** 2
         sizes = np.sqrt(np.bincount(pair.ravel(), weights=squares, minlength=len(pairs)))
-        used = sizes > 0.0
-        row, node = np.divmod(pairs[used], max(nodes, 1))
-        return sp.csr_matrix((sizes[used], (row, node)), shape=(entries.shape[0], nodes))
+        has_weight = sizes > 0.0
+        row, node = np.divmod(pairs[has_weight], max(nodes, 1))
+        return sp.csr_matrix((sizes[has_weight], (row, node)), shape=(entries.shape[0], nodes))
 
     def spread_to_unknowns(self, weights: sp.csr_matrix) -> sp.csr_matrix:
         """Return weights (rows, k) of unknowns, each that of its node, columns ascending."""
@@ -176,12 +176,12 @@ class _Neighbours:
         return of_unknowns
 
     def fit(
-        self, used: Indices, weights: Array, directions: Array, points: Array, *, turning: bool
+        self, donors: Indices, weights: Array, directions: Array, points: Array, *, turning: bool
     ) -> tuple[Array, Array]:
         """Fit rigid motions to neighbours, for n unknowns at a time.
 
         Args:
-            used: (n, j) which of these neighbours each unknown has.
+            donors: (n, j) which of these neighbours each unknown has.
             weights: (n, j) w_J of each.
             directions: (n, d) in which the unknowns point.
             points: (n, d) where they are [m].
@@ -192,9 +192,9 @@ class _Neighbours:
             The rows R_i G⁻¹ w_J R_Jᵀ (n, j), and how much of a rigid motion each loses (n,).
         """
         # Rigid motions about each unknown, in units of its neighbourhood.
-        offset = self.points[used] - points[:, None, :]
+        offset = self.points[donors] - points[:, None, :]
         size = np.max(np.abs(offset), axis=(1, 2))[:, None, None]
-        R = rigid_motions(self.directions[used], offset / size)
+        R = rigid_motions(self.directions[donors], offset / size)
         target = rigid_motions(directions, np.zeros_like(points))
         if not turning:
             d = points.shape[1]
@@ -233,10 +233,10 @@ def _find_neighbours(system: SemiDiscreteSystem, donors: Mask, columns: Indices)
 
     def describe(rows: Indices) -> tuple[Indices, Indices, Array, Array]:
         """Return all unknowns of the donor nodes in these rows, as ``_Neighbours`` holds them."""
-        own = np.flatnonzero(np.isin(node, node[rows[donors[rows]]]))
-        return first + own, node[own], system.influence[own], coordinates[own]
+        unknowns = np.flatnonzero(np.isin(node, node[rows[donors[rows]]]))
+        return first + unknowns, node[unknowns], system.influence[unknowns], coordinates[unknowns]
 
-    mine, foreign = _owned_of_named(system, columns)
+    mine, foreign = _locate_named(system, columns)
     parts = from_each(algebra.comm, describe(foreign))
     parts[algebra.comm.rank] = describe(mine)
     numbers, nodes, directions, points = map(np.concatenate, zip(*parts, strict=True))
@@ -245,7 +245,7 @@ def _find_neighbours(system: SemiDiscreteSystem, donors: Mask, columns: Indices)
     return _Neighbours(numbers[order], place.ravel(), directions[order], points[order])
 
 
-def _owned_of_named(system: SemiDiscreteSystem, columns: Indices) -> tuple[Indices, Indices]:
+def _locate_named(system: SemiDiscreteSystem, columns: Indices) -> tuple[Indices, Indices]:
     """Return owned unknowns whose columns this rank names, and those that others name. Collective.
 
     The columns (k,) are numbered over all ranks.
@@ -264,7 +264,7 @@ def select_named(system: SemiDiscreteSystem, columns: Indices) -> Indices:
 
     Collective.
     """
-    return np.union1d(*_owned_of_named(system, columns))
+    return np.union1d(*_locate_named(system, columns))
 
 
 def rigid_motions(directions: Array, offset: Array) -> Array:

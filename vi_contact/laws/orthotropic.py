@@ -146,5 +146,10 @@ class Orthotropic:
             if isinstance(section, PlaneStress):
                 # Strain across the plane is eliminated, where the stress is zero.
                 C = C - np.einsum("ij,kl->ijkl", C[:, :, 2, 2], C[2, 2]) / C[2, 2, 2, 2]
-        rows = VOIGT[dimension] if dimension == 3 else (*VOIGT[2], (2, 2))
-        return np.array([[C[row + column] for column in VOIGT[dimension]] for row in rows])
+        columns = VOIGT[dimension]
+        rows = columns if dimension == 3 else (*columns, (2, 2))
+        matrix = np.empty((len(rows), len(columns)))
+        for i, row in enumerate(rows):
+            for j, column in enumerate(columns):
+                matrix[i, j] = C[row + column]
+        return matrix

@@ -18,6 +18,7 @@ motion. The bracket is the reaction along a^R [N], of either sign.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -39,7 +40,8 @@ class BilateralMotion:
 
     Args:
         t: times (m,) [s].
-        q, v: coordinates and their rates (m, n).
+        q: coordinates (m, n).
+        v: their rates (m, n).
         phi: values of the constraints (m, k).
         multiplier: coordinates lambda^R of the constraints (m, k).
         reaction: forces along a^R (m, k) [N], of either sign.
@@ -86,10 +88,9 @@ def bilateral_motion(
             f"{owner}: bilateral constraints need at least one system, whose velocities are the "
             "rates of q; give one for each constraint"
         )
-    q, v, times = (
-        array(owner, name, value, (None,))
-        for name, value in (("q0", q0), ("v0", v0), ("times", times))
-    )
+    q = array(owner, "q0", q0, (None,))
+    v = array(owner, "v0", v0, (None,))
+    times = array(owner, "times", times, (None,))
     if len(times) < 2 or np.any(np.diff(times) <= 0.0):
         raise InputError(
             f"{owner}: times are {shown(times)}; give two or more that increase, the first the "
@@ -98,18 +99,50 @@ def bilateral_motion(
     check_tolerance(owner, rtol)
     for system in systems:
         system.check(q, v, float(times[0]))
+
+    # The unknowns y are q, v, lambda and the momenta m̄ λ̇.
     n = len(q)
+    parts = [n, 2 * n, 2 * n + k]
+    y0 = np.concatenate([q, v, np.zeros(2 * k)])
+    solution = _integrate(systems, y0, times, parts, rtol)
+
+    # Constraints and reactions at the times that were asked for.
+    places, speeds, multipliers, momenta = np.split(solution.y.T, parts, axis=1)
+    phi = np.empty((len(places), k))
+    for row, place in enumerate(places):
+        for R, system in enumerate(systems):
+            phi[row, R] = system.rho(place)
+    states = zip(solution.t, places, speeds, multipliers, momenta, strict=True)
+    reaction = np.array([_solve(systems, *state)[1] for state in states])
+    return BilateralMotion(solution.t, places, speeds, phi, multipliers, reaction)
+
+
+def _integrate(
+    systems: Sequence[ConstrainedSystem], y0: Array, times: Array, parts: list[int], rtol: float
+) -> Any:
+    """Return what ``solve_ivp`` makes of the unknowns y, with their values at the times.
+
+    Args:
+        systems: one for each constraint.
+        y0: the unknowns at the start.
+        times: (m,) [s].
+        parts: where y is cut into q, v, lambda and momenta.
+        rtol: relative tolerance.
+
+    Raises:
+        StepFailure: accelerations that are not finite at the start, or the integrator stops.
+    """
     evaluations = Evaluations()
 
     def rates(t: float, y: Array) -> Array:
+        """Return the rates of y at a time [s]."""
         evaluations.spend(t)
-        place, speed, multiplier, momentum = np.split(y, [n, 2 * n, 2 * n + k])
-        acceleration, _, multiplier_rate, force = _solved(
+        place, speed, multiplier, momentum = np.split(y, parts)
+        acceleration, _, multiplier_rate, force = _solve(
             systems, t, place, speed, multiplier, momentum
         )
         return np.concatenate([speed, acceleration, multiplier_rate, force])
 
-    y0 = np.concatenate([q, v, np.zeros(2 * k)])
     atol = rtol * max(float(np.max(np.abs(y0))), 1e-300)
     with one_sentence():
         if not np.all(np.isfinite(rates(float(times[0]), y0))):
@@ -117,21 +150,18 @@ def bilateral_motion(
                 f"the accelerations at t = {times[0]:.6g} s are not finite: check what the "
                 "systems' functions return there, and that the constraints are independent"
             )
-        found = solve_ivp(
+        solution = solve_ivp(
             rates, (times[0], times[-1]), y0, t_eval=times, rtol=rtol, atol=atol, method="DOP853"
         )
-    if found.status < 0:
+    if solution.status < 0:
         raise StepFailure(
-            f"the motion could not be integrated beyond t = {evaluations.t:.6g} s: {found.message}"
+            f"the motion could not be integrated beyond t = {evaluations.t:.6g} s: "
+            f"{solution.message}"
         )
-    places, speeds, multipliers, momenta = np.split(found.y.T, [n, 2 * n, 2 * n + k], axis=1)
-    phi = np.array([[system.rho(row) for system in systems] for row in places])
-    rows = zip(found.t, places, speeds, multipliers, momenta, strict=True)
-    reaction = np.array([_solved(systems, *row)[1] for row in rows])
-    return BilateralMotion(found.t, places, speeds, phi, multipliers, reaction)
+    return solution
 
 
-def _solved(
+def _solve(
     systems: Sequence[ConstrainedSystem],
     t: float,
     q: Array,
@@ -139,36 +169,59 @@ def _solved(
     multiplier: Array,
     momentum: Array,
 ) -> tuple[Array, Array, Array, Array]:
-    """(v̇, reactions, λ̇, (m̄ λ̇)˙) from (31) and (34)."""
+    """Return (v̇, reactions, λ̇, (m̄ λ̇)˙) from (31) and (34).
+
+    Args:
+        systems: one for each of the k constraints.
+        t: time [s].
+        q: coordinates (n,).
+        v: their rates (n,).
+        multiplier: lambda (k,).
+        momentum: m̄ λ̇ (k,).
+    """
+    # Accelerations without constraints, and M⁻¹aᵀ of every constraint.
     first = systems[0]
     a = np.array([system.gradient(q) for system in systems], dtype=float)
-    both = np.linalg.solve(
-        first.matrix(q), np.column_stack([first.generalised_force(t, q, v), a.T])
-    )
-    free = both[:, 0]
-    along = both[:, 1:]
+    right_sides = np.column_stack([first.generalised_force(t, q, v), a.T])
+    solutions = np.linalg.solve(first.matrix(q), right_sides)
+    free = solutions[:, 0]
+    along = solutions[:, 1:]
+
+    # m̄, c̄, k̄ and f̄ of (32), (33).
     masses = 1.0 / np.einsum("ri,ir->r", a, along)
     c = along * masses
     damping, stiffness, pull = _along(first, t, q, v, c)
+
+    # The reactions that bring about φ̈ of (34).
     phi = np.array([system.rho(q) for system in systems])
     rate = np.asarray(a @ v)
     turning = np.array([system.turning(q, v) for system in systems])
-    # φ̈ of (34)
-    wanted = -(_slope(systems, q, v) * rate + damping * rate + stiffness * phi) / masses
-    reaction = np.linalg.solve(a @ along, wanted - a @ free - turning)
+    phi_acceleration = -(_slope(systems, q, v) * rate + damping * rate + stiffness * phi) / masses
+    reaction = np.linalg.solve(a @ along, phi_acceleration - a @ free - turning)
     multiplier_rate = momentum / masses
     force = reaction - damping * multiplier_rate - stiffness * multiplier + pull
     return np.asarray(free + along @ reaction), reaction, multiplier_rate, force
 
 
 def _along(system: ConstrainedSystem, t: float, q: Array, v: Array, c: Array) -> Array:
-    """(c̄, k̄, f̄) of (32), (3, k)."""
+    """Return (c̄, k̄, f̄) of (32), (3, k).
+
+    Args:
+        system: whose force it is.
+        t: time [s].
+        q: coordinates (n,).
+        v: their rates (n,).
+        c: directions of the constraints (n, k).
+    """
     values = np.zeros((3, c.shape[1]))
     force = system.force
     if force is None:
         return values
     for R, way in enumerate(c.T):
-        h, w = (system.difference(x) / float(np.max(np.abs(way))) for x in (q, v))
+        # Central differences of the force along the direction, by h of q and by w of v.
+        size = float(np.max(np.abs(way)))
+        h = system.difference(q) / size
+        w = system.difference(v) / size
         values[0, R] = -way @ (force(t, q, v + w * way) - force(t, q, v - w * way)) / (2.0 * w)
         values[1, R] = -way @ (force(t, q + h * way, v) - force(t, q - h * way, v)) / (2.0 * h)
         values[2, R] = way @ force(t, q, v)
@@ -176,13 +229,14 @@ def _along(system: ConstrainedSystem, t: float, q: Array, v: Array, c: Array) ->
 
 
 def _slope(systems: Sequence[ConstrainedSystem], q: Array, v: Array) -> Array:
-    """m̄˙ (k,) by a central difference along the motion."""
+    """Return m̄˙ (k,) by a central difference along the motion."""
     size = float(np.max(np.abs(v)))
     if size == 0.0:
         return np.zeros(len(systems))
     h = systems[0].difference(q) / size
 
     def masses(place: Array) -> Array:
+        """Return m̄ (k,) at coordinates (n,)."""
         M = systems[0].matrix(place)
         a = np.array([system.gradient(place) for system in systems], dtype=float)
         return np.asarray(1.0 / np.einsum("ri,ir->r", a, np.linalg.solve(M, a.T)))

@@ -38,16 +38,15 @@ from ..core.checks import instance, number, shown
 from ..core.errors import InputError
 from ..core.quantities import RATIO, Unit
 from ..core.surfaces import ContactSurface
-from .layer import Layer, sized
+from .layer import Layer, check_size
 from .metric import Metric
 from .particle import damping_ratio
-from .trajectory import passage
+from .trajectory import cross_layer
 
 LEAST_RESTITUTION = 1e-3  # below it the search takes minutes
 DOUBLINGS = 60  # of the damping ratio in search of a rebound
-SHORT_STEP = (
-    1e-5  # |rho_1 - rho_0| over rho below which the quotient is the derivative in the middle
-)
+# |rho_1 - rho_0| over rho below which the quotient is the derivative in the middle.
+SHORT_STEP = 1e-5
 
 
 @dataclass(frozen=True)
@@ -73,10 +72,10 @@ class ContactLayer:
 
     def __post_init__(self) -> None:
         instance("ContactLayer", "layer", self.layer, Layer, "give a Layer")
-        if number(
-            "ContactLayer", "the law's mass per area", self.mass, not_negative=True, unit="kg/m²"
-        ):
-            sized("ContactLayer", "the law's mass per area", self.mass, "kg/m²")
+        owner = "ContactLayer"
+        meaning = "the law's mass per area"
+        if number(owner, meaning, self.mass, not_negative=True, unit="kg/m²"):
+            check_size(owner, meaning, self.mass, "kg/m²")
         if self.layer.speed is None:
             raise InputError(
                 "a contact law needs the layer's speed V: give Layer(speed=...), the speed of "
@@ -90,12 +89,13 @@ class ContactLayer:
 
     @cached_property
     def _fading(self) -> CubicHermiteSpline:
-        """Y on [a, b] as a function of ln rho, to ten digits; its derivative there is delta."""
+        """Return Y on [a, b] as a function of ln rho, to ten digits; its derivative is delta."""
         y = np.linspace(np.log(self.layer.a), np.log(self.layer.width), 801)
         delta = self.layer.cut_off(np.exp(y))
         middle = self.layer.cut_off(np.exp(0.5 * (y[1:] + y[:-1])))
+
+        # Simpson's rule, a third of the trapezia and two of the values in the middle.
         trapezia = cumulative_trapezoid(delta, y, initial=0.0)
-        # Simpson's rule
         Y = np.append(0.0, np.cumsum(4.0 * middle)) * (y[1] - y[0]) / 6.0 + trapezia / 3.0
         return CubicHermiteSpline(y, Y - Y[-1], delta)
 
@@ -111,11 +111,13 @@ class ContactLayer:
 
     def potential(self, rho: Array) -> Array:
         """Return Y <= 0: -k b² Y is the energy stored per area when nothing moves [J/m²]."""
-        a, b = np.log(self.layer.a), np.log(self.layer.width)
+        a = np.log(self.layer.a)
+        b = np.log(self.layer.width)
         y = np.log(rho)
-        return np.where(
-            y < a, self._fading(a) + y - a, np.where(y < b, self._fading(np.clip(y, a, b)), 0.0)
-        )
+
+        # Below a the slope over ln rho is 1, beyond b it is 0.
+        fading = np.where(y < b, self._fading(np.clip(y, a, b)), 0.0)
+        return np.where(y < a, self._fading(a) + y - a, fading)
 
     def mean_pressure(self, rho: Array, old: Array, rate: Array, dt: float) -> tuple[Array, Array]:
         """Return the mean pressure p̄ (m,) [Pa] of a step and its derivative d p̄/d rho_1 [Pa/m].
@@ -126,19 +128,24 @@ class ContactLayer:
             rate: w_0 = d ln(rho)/dt at its beginning (m,) [1/s].
             dt: time step [s].
         """
-        layer, gamma = self.layer, self.mass
+        layer = self.layer
+        gamma = self.mass
+
+        # bracket: b² [k - …] of the law; damper: its factor of ln rho_1, without b².
         squared = layer.width**2
         damper = layer.c / layer.v / dt + 2.0 * gamma / dt**2
         bracket = squared * (layer.k - damper * np.log(rho / old) + 2.0 * gamma / dt * rate)
+
+        # quotient: (Y_1 - Y_0)/(rho_1 - rho_0), of short steps Y' in the middle.
         step = rho - old
         middle = 0.5 * (rho + old)
         cut = layer.cut_off
         near = np.abs(step) < SHORT_STEP * middle
-        # quotient: (Y_1 - Y_0)/(rho_1 - rho_0); slope: its derivative
         step = np.where(near, middle, step)
-        quotient = np.where(
-            near, cut(middle) / middle, (self.potential(rho) - self.potential(old)) / step
-        )
+        difference = (self.potential(rho) - self.potential(old)) / step
+        quotient = np.where(near, cut(middle) / middle, difference)
+
+        # slope: its derivative by rho_1, of short steps half of Y'' by a central difference.
         h = 1e-4 * middle
         bend = 0.5 * (cut(middle + h) / (middle + h) - cut(middle - h) / (middle - h)) / (2.0 * h)
         slope = np.where(near, bend, (cut(rho) / rho - quotient) / step)
@@ -147,14 +154,16 @@ class ContactLayer:
     def rebound(self, mass: float, speed: float) -> float:
         """Return the restitution e [-] of a rigid body that enters, by one equation in time.
 
-        The body has this mass [kg/m²] and enters with this speed [m/s].
+        Args:
+            mass: of the body [kg/m²].
+            speed: with which it enters [m/s].
 
         Raises:
             InputError: a value is outside its range, or a law with metric, which knows its own mass
                 alone, is asked for another.
         """
-        sized("ContactLayer.rebound", "mass", mass, "kg/m²")
-        sized("ContactLayer.rebound", "speed", speed, "m/s")
+        check_size("ContactLayer.rebound", "mass", mass, "kg/m²")
+        check_size("ContactLayer.rebound", "speed", speed, "m/s")
         if self.mass not in (0.0, mass):
             raise InputError(
                 f"the law's metric is that of {self.mass} kg/m²: ask for the rebound of that mass"
@@ -198,7 +207,7 @@ def contact_layer(
         ("layer width", width, "m"),
         ("strength k b²/(mass V²)", strength, "units of one"),
     ):
-        sized("contact_layer", f"the {name}", value, unit)
+        check_size("contact_layer", f"the {name}", value, unit)
     if not LEAST_RESTITUTION <= number("contact_layer", "the restitution coefficient e", e) <= 1.0:
         raise InputError(
             f"contact_layer: the restitution coefficient e is {e}; give a number from "
@@ -208,15 +217,19 @@ def contact_layer(
         raise InputError(
             f"contact_layer: a law cannot have {shown(metric)}; give Metric.BLENDED or Metric.FLAT"
         )
-    a = 0.5 * width if start is None else sized("contact_layer", "start", start, "m")
+    a = 0.5 * width if start is None else check_size("contact_layer", "start", start, "m")
     k = strength * mass * speed**2 / width**2
 
     def layer(s: float) -> Layer:
+        """Return the layer with the damping ratio s [-]."""
         return Layer(width, k=k, c=s * width * k, speed=speed, start=a)
 
     def excess(s: float) -> float:
+        """Return by how much the restitution with s is above e."""
         return _rebound(layer(s), mass, speed, metric) - e
 
+    # Restitution falls with s: double s from that of the dominant terms until it is too low, then
+    # find the root between.
     s = damping_ratio(e)
     low = 0.0
     if s > 0.0:
@@ -232,5 +245,12 @@ def contact_layer(
 
 
 def _rebound(layer: Layer, mass: float, speed: float, metric: Metric) -> float:
-    """Return e of a rigid body."""
-    return passage(layer, mass, speed, metric, rtol=1e-8).contacts[0].restitution
+    """Return e of a rigid body.
+
+    Args:
+        layer: the law.
+        mass: of the body [kg/m²].
+        speed: with which it enters [m/s].
+        metric: the reading of the law.
+    """
+    return cross_layer(layer, mass, speed, metric, rtol=1e-8).contacts[0].restitution

@@ -21,8 +21,9 @@ from ..core.algebra import Array
 from ..core.checks import number, optional
 from ..core.errors import InputError
 
-# of lengths, speeds and masses; of k and c: products of their squares are finite
-LARGEST, LARGEST_FORCE = (1e60, 1e150)
+# Products of squares of these are finite.
+LARGEST = 1e60  # of lengths, speeds and masses
+LARGEST_FORCE = 1e150  # of k and c
 
 
 @dataclass(frozen=True)
@@ -55,36 +56,25 @@ class Layer:
     start: float | None = None
 
     def __post_init__(self) -> None:
-        sized("Layer", "the layer width b", self.width, "m")
+        check_size("Layer", "the layer width b", self.width, "m")
         for name, unit in (("k", "N/m"), ("c", "N")):
-            if number(
-                "Layer",
-                f"the layer parameter {name}",
-                getattr(self, name),
-                not_negative=True,
-                unit=unit,
-            ):
-                sized(
-                    "Layer",
-                    f"the layer parameter {name}",
-                    getattr(self, name),
-                    unit,
-                    most=LARGEST_FORCE,
-                )
+            meaning = f"the layer parameter {name}"
+            value = getattr(self, name)
+            if number("Layer", meaning, value, not_negative=True, unit=unit):
+                check_size("Layer", meaning, value, unit, most=LARGEST_FORCE)
         if self.k == 0.0 and self.c == 0.0:
             raise InputError(
                 "layer parameters k and c are both zero: nothing would push the body back, give k "
                 "> 0"
             )
-        optional(sized, "Layer", "the layer speed V", self.speed, "m/s")
-        if (
-            self.start is not None
-            and sized("Layer", "the layer start a", self.start, "m") > self.width
-        ):
-            raise InputError(
-                f"Layer: the layer start a is {self.start}; give a length up to the width "
-                f"{self.width} m"
-            )
+        optional(check_size, "Layer", "the layer speed V", self.speed, "m/s")
+        if self.start is not None:
+            start = check_size("Layer", "the layer start a", self.start, "m")
+            if start > self.width:
+                raise InputError(
+                    f"Layer: the layer start a is {self.start}; give a length up to the width "
+                    f"{self.width} m"
+                )
 
     @property
     def a(self) -> float:
@@ -117,7 +107,8 @@ class Layer:
         a = self.a
         b = self.width
         between = (x > a) & (x < b)
-        z = np.where(between, (x - a) / (b - a if b > a else 1.0), 0.5)
+        length = b - a if b > a else 1.0
+        z = np.where(between, (x - a) / length, 0.5)
         z = np.clip(z, 1e-3, 1.0 - 1e-3)  # beyond that exp(-1000) and 1 - exp(-1000)
         return np.where(between, expit(1.0 / z - 1.0 / (1.0 - z)), np.where(x <= a, 1.0, 0.0))
 
@@ -132,12 +123,23 @@ class Layer:
         )
 
 
-def sized(owner: str, meaning: str, value: Any, unit: str, *, most: float = LARGEST) -> float:
-    """Return a positive number whose powers are finite; InputError for another."""
-    found = number(owner, meaning, value, positive=True, unit=unit)
-    if not 1.0 / most <= found <= most:
+def check_size(owner: str, meaning: str, value: Any, unit: str, *, most: float = LARGEST) -> float:
+    """Return a positive number whose powers are finite.
+
+    Args:
+        owner: who asks, for messages.
+        meaning: of the number, in words.
+        value: to be checked.
+        unit: of the number, for messages.
+        most: largest number; the smallest is one over it.
+
+    Raises:
+        InputError: another number, or none.
+    """
+    size = number(owner, meaning, value, positive=True, unit=unit)
+    if not 1.0 / most <= size <= most:
         raise InputError(
-            f"{owner}: {meaning} is {found:g}; give a number from {1.0 / most:g} to {most:g} in "
+            f"{owner}: {meaning} is {size:g}; give a number from {1.0 / most:g} to {most:g} in "
             f"{unit}"
         )
-    return found
+    return size

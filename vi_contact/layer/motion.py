@@ -24,12 +24,11 @@ import numpy as np
 from ..core.algebra import Array
 from ..core.checks import array, function, number
 from ..core.errors import InputError, StepFailure
-from .layer import sized
+from .layer import check_size
 
 EVALUATIONS = 100_000  # of the acceleration in one motion
-DIFFERENCE_STEP = (
-    6e-6  # of a central difference over the size of its argument: eps to the power 1/3
-)
+# Step of a central difference over the size of its argument: eps to the power 1/3.
+DIFFERENCE_STEP = 6e-6
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,7 @@ class ConstrainedSystem:
 
     def __post_init__(self) -> None:
         owner = "ConstrainedSystem"
-        sized(owner, "the scale of the coordinates", self.scale, "their units")
+        check_size(owner, "the scale of the coordinates", self.scale, "their units")
         if not callable(self.mass):
             check_positive(owner, "the mass matrix", self.mass, "kg")
         for name in ("rho", "gradient", "force", "rates", "gradient_rate"):
@@ -68,7 +67,12 @@ class ConstrainedSystem:
                 function(owner, name, getattr(self, name), "give a function, see its docstring")
 
     def check(self, q: Array, v: Array, t: float = 0.0) -> None:
-        """Check what the functions return at coordinates q (n_q,), velocities v (n,), time t [s].
+        """Check what the functions return at a state.
+
+        Args:
+            q: coordinates (n_q,).
+            v: velocities (n,).
+            t: time [s].
 
         Raises:
             InputError: a function returns another shape, a text, NaN or infinity.
@@ -116,41 +120,59 @@ class ConstrainedSystem:
         return float(change @ v) / (2.0 * h)
 
     def generalised_force(self, t: float, q: Array, v: Array) -> Array:
-        """Return f - Γ(v, v), (n,)."""
+        """Return f - Γ(v, v), (n,) [N].
+
+        Args:
+            t: time [s].
+            q: coordinates (n_q,).
+            v: velocities (n,).
+        """
         f = np.zeros_like(v) if self.force is None else np.asarray(self.force(t, q, v), dtype=float)
         if not callable(self.mass):
             return f
-        # ∂M_IJ/∂q_K in [K, I, J], for v = q̇
+
+        # Slopes ∂M_IJ/∂q_K in [K, I, J] by central differences. Here v = q̇: a mass that is a
+        # function of q goes with coordinates, not with quasi-velocities.
         h = self.difference(q)
         slopes = np.empty((len(q), len(v), len(v)))
         for K in range(len(q)):
             side = np.zeros_like(q)
             side[K] = h
-            slopes[K] = (np.asarray(self.mass(q + side)) - np.asarray(self.mass(q - side))) / (
-                2.0 * h
-            )
-        return f - (
-            np.einsum("kij,k,j->i", slopes, v, v) - 0.5 * np.einsum("ijk,j,k->i", slopes, v, v)
-        )
+            change = np.asarray(self.mass(q + side)) - np.asarray(self.mass(q - side))
+            slopes[K] = change / (2.0 * h)
+
+        # [Γ(v, v)]_I = Ṁ_IJ v_J - ½ ∂M_JK/∂q_I v_J v_K.
+        rate = np.einsum("kij,k,j->i", slopes, v, v)
+        gradient = np.einsum("ijk,j,k->i", slopes, v, v)
+        return f - (rate - 0.5 * gradient)
 
     def difference(self, q: Array) -> float:
         """Return the way over which to take a central difference at q."""
         return DIFFERENCE_STEP * max(self.scale, float(np.max(np.abs(q))))
 
     def accelerations(self, t: float, q: Array, v: Array) -> tuple[Array, Array, float, float]:
-        """Return (v̇ without layer (n,), M⁻¹Aᵀ (n,), g_11 [kg], ρ̈ without layer [m/s²])."""
+        """Return (v̇ without layer (n,), M⁻¹Aᵀ (n,), g_11 [kg], ρ̈ without layer [m/s²]).
+
+        Args:
+            t: time [s].
+            q: coordinates (n_q,).
+            v: velocities (n,).
+        """
         A = np.asarray(self.gradient(q), dtype=float)
-        both = np.linalg.solve(
-            self.matrix(q), np.column_stack([self.generalised_force(t, q, v), A])
-        )
-        free, along = both[:, 0], both[:, 1]
-        return free, along, float(1.0 / (A @ along)), float(A @ free) + self.turning(q, v)
+        right_sides = np.column_stack([self.generalised_force(t, q, v), A])
+        solutions = np.linalg.solve(self.matrix(q), right_sides)
+        free = solutions[:, 0]
+        along = solutions[:, 1]
+        normal_mass = float(1.0 / (A @ along))
+        return free, along, normal_mass, float(A @ free) + self.turning(q, v)
 
 
 class Evaluations:
-    """Count what an integration in time spends.
+    """Count what an integration in time spends, so that no motion goes on for ever.
 
-    No motion then goes on for ever; t is the time it has come to [s].
+    Attributes:
+        spent: number of evaluations of the acceleration.
+        t: the time that the integration has come to [s].
     """
 
     def __init__(self) -> None:
@@ -190,7 +212,14 @@ def check_tolerance(owner: str, rtol: float) -> None:
 
 
 def check_positive(owner: str, meaning: str, matrix: Any, unit: str) -> None:
-    """Raise InputError unless the matrix is square, symmetric and positive definite."""
+    """Raise InputError unless the matrix is square, symmetric and positive definite.
+
+    Args:
+        owner: who asks, for messages.
+        meaning: of the matrix, in words.
+        matrix: to be checked.
+        unit: of its entries, for messages.
+    """
     M = array(owner, meaning, matrix, (None, None), unit=unit)
     if (
         M.shape[0] != M.shape[1]

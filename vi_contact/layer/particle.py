@@ -32,7 +32,7 @@ from scipy.special import exprel, lambertw
 from ..core.algebra import Array
 from ..core.checks import instance, number
 from ..core.errors import InputError
-from .layer import Layer, sized
+from .layer import Layer, check_size
 
 LEAST = 1e-9  # least restitution that is asked for
 
@@ -60,8 +60,8 @@ class ParticleImpact:
 
     def __post_init__(self) -> None:
         instance("ParticleImpact", "layer", self.layer, Layer, "give a Layer")
-        sized("ParticleImpact", "the particle's mass", self.mass, "kg")
-        sized("ParticleImpact", "the particle's speed", self.speed, "m/s")
+        check_size("ParticleImpact", "the particle's mass", self.mass, "kg")
+        check_size("ParticleImpact", "the particle's speed", self.speed, "m/s")
         if self.layer.k == 0.0:
             raise InputError(
                 "layer parameter k is zero: the particle would stay in the layer, give k > 0"
@@ -80,6 +80,7 @@ class ParticleImpact:
 
     @property
     def _kappa(self) -> float:
+        """Return kappa of (36) [-]."""
         return self.mass * self.speed**2 / (self.layer.k * self.layer.a**2)
 
     @property
@@ -136,10 +137,13 @@ class ParticleImpact:
 
         That is the force in the covector space of the boundary; e_p is a little above e_v.
         """
-        t_c, t_f = self.compression_time, self.duration
-        pushed = quad(self.boundary_force, 0.0, t_c, epsabs=0.0, epsrel=1e-12)[0]
-        returned = quad(self.boundary_force, t_c, t_f, epsabs=1e-12 * abs(pushed), epsrel=1e-12)[0]
-        return float(returned / pushed)
+        t_c = self.compression_time
+        t_f = self.duration
+
+        # Impulses of compression p_c and of restitution p_r.
+        p_c, *_ = quad(self.boundary_force, 0.0, t_c, epsabs=0.0, epsrel=1e-12)
+        p_r, *_ = quad(self.boundary_force, t_c, t_f, epsabs=1e-12 * abs(p_c), epsrel=1e-12)
+        return float(p_r / p_c)
 
 
 def restitution(s: float) -> float:
@@ -151,8 +155,12 @@ def restitution(s: float) -> float:
     number("restitution", "the damping ratio s = c/(a k)", s, not_negative=True)
     if s > 1.0:
         return (1.0 + float(lambertw(-(1.0 + s) * np.exp(-(1.0 + s))).real)) / s
-    e = 1.0 - 2.0 / 3.0 * s + 4.0 / 9.0 * s**2 - 44.0 / 135.0 * s**3 * (s < 0.3)
-    for _ in range(8):  # Newton; e² h(-s e) has the derivative e/(1 - s e)
+
+    # Newton's method from the series for small s; e² h(-s e) has the derivative e/(1 - s e).
+    e = 1.0 - 2.0 / 3.0 * s + 4.0 / 9.0 * s**2
+    if s < 0.3:
+        e = e - 44.0 / 135.0 * s**3
+    for _ in range(8):
         e -= (e**2 * _h(-s * e) - _h(s)) * (1.0 - s * e) / e
     return e
 
@@ -209,28 +217,24 @@ def layer_for(
             f"layer_for: deepest is {deepest}; give the part of the layer that is left, between 0 "
             "and 1"
         )
-    given = (
-        ("the mass", mass, "kg"),
-        ("the speed", speed, "m/s"),
-        ("the layer width b", width, "m"),
-    )
-    for name, value, unit in given:
-        sized("layer_for", name, value, unit)
+    check_size("layer_for", "the mass", mass, "kg")
+    check_size("layer_for", "the speed", speed, "m/s")
+    check_size("layer_for", "the layer width b", width, "m")
     s = damping_ratio(e)
-    a = width if start is None else sized("layer_for", "start", start, "m")
+    a = width if start is None else check_size("layer_for", "start", start, "m")
     k = mass * speed**2 / a**2 * _h(s) / -np.log(deepest)
     return Layer(width, k=float(k), c=float(s * a * k), speed=speed, start=start)
 
 
 def _h(z: float) -> float:
-    """(z - ln(1 + z))/z², ½ at z = 0."""
+    """Return (z - ln(1 + z))/z², ½ at z = 0, by its series where digits would be lost."""
     if abs(z) > 0.05:
         return float((z - np.log1p(z)) / z**2)
     return sum((-z) ** n / (n + 2.0) for n in range(14))
 
 
 def _phi(z: Array) -> Array:
-    """(exp(-z) - 1 + z)/z², ½ at z = 0."""
+    """Return (exp(-z) - 1 + z)/z², ½ at z = 0, by its series where digits would be lost."""
     small = np.abs(z) < 0.05
     large = np.where(small, 1.0, z)
     series = np.zeros_like(z)

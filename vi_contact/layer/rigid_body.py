@@ -23,7 +23,7 @@ import numpy as np
 from ..core.algebra import Array
 from ..core.checks import array, number, shape_of
 from ..core.errors import InputError
-from .layer import sized
+from .layer import check_size
 from .motion import ConstrainedSystem, check_positive
 
 
@@ -42,7 +42,7 @@ class Ellipsoid:
 
     def __post_init__(self) -> None:
         for length in array("Ellipsoid", "axes", self.axes, (3,), unit="m"):
-            sized("Ellipsoid", "a semi-axis of the ellipsoid", float(length), "m")
+            check_size("Ellipsoid", "a semi-axis of the ellipsoid", float(length), "m")
 
     def __call__(self, nu: Array) -> Array:
         """Return the point for the plane's normal nu in the body frame."""
@@ -80,14 +80,9 @@ class RigidBody:
 
     def __post_init__(self) -> None:
         owner = "RigidBody"
-        sized(owner, "the body's mass", self.mass, "kg")
-        array(
-            owner,
-            "inertia",
-            self.inertia,
-            (3, 3) if len(shape_of(self.inertia)) == 2 else (3,),
-            unit="kg m²",
-        )
+        check_size(owner, "the body's mass", self.mass, "kg")
+        is_matrix = len(shape_of(self.inertia)) == 2
+        array(owner, "inertia", self.inertia, (3, 3) if is_matrix else (3,), unit="kg m²")
         if not callable(self.point) or isinstance(self.point, type):
             array(owner, "point", self.point, (3,), unit="m")
         for name in ("normal", "gravity"):
@@ -116,7 +111,8 @@ class RigidBody:
     def nearest(self, q: Array) -> tuple[Array, Array]:
         """Return the nearest point and the normal, (l_P, n), in the body frame."""
         nu = rotation(q[3:]).T @ self.n
-        return np.asarray(self.point(nu) if callable(self.point) else self.point, dtype=float), nu
+        point = self.point(nu) if callable(self.point) else self.point
+        return np.asarray(point, dtype=float), nu
 
     def rho(self, q: Array) -> float:
         """Return the distance of P from the plane [m] (44), q as of ``after_impact``."""
@@ -153,7 +149,8 @@ class RigidBody:
             InputError: another shape, or a negative e.
         """
         owner = "RigidBody.after_impact"
-        q, v = array(owner, "q", q, (7,)), array(owner, "v", v, (6,))
+        q = array(owner, "q", q, (7,))
+        v = array(owner, "v", v, (6,))
         number(owner, "e", e, not_negative=True)
         A = self.gradient(q)
         along = np.linalg.solve(self.matrix, A)
@@ -172,13 +169,13 @@ class RigidBody:
         )
 
     def _force(self, t: float, q: Array, v: Array) -> Array:
+        """Return (m g, -Omega x J Omega), (6,) [N, N m], at any time and place."""
         spin = v[3:]
-        return np.concatenate(
-            [self.mass * np.asarray(self.gravity), -np.cross(spin, self.J @ spin)]
-        )
+        weight = self.mass * np.asarray(self.gravity)
+        return np.concatenate([weight, -np.cross(spin, self.J @ spin)])
 
     def _turning(self, q: Array, v: Array) -> float:
-        """n·R (Omega x (Omega x l_P)), of a point fixed in the body."""
+        """Return Ȧ v = n·R (Omega x (Omega x l_P)), of a point fixed in the body."""
         l_P, nu = self.nearest(q)
         return float(nu @ np.cross(v[3:], np.cross(v[3:], l_P)))
 
@@ -197,7 +194,7 @@ def rotation(p: Array) -> Array:
 
 
 def _rates(q: Array, v: Array) -> Array:
-    """(ṙ_c, ½ p ∘ (0, Omega))."""
+    """Return q̇ = (ṙ_c, ½ p ∘ (0, Omega)), (7,)."""
     w = q[3]
     u = q[4:]
     spin = v[3:]

@@ -29,10 +29,13 @@ from ..schemes.midpoint import Midpoint
 from ..solvers.condensed import Condensed
 from .contact_law import ContactLayer
 
-NEWTON_STEPS, HALVINGS = 60, 30
+NEWTON_STEPS = 60
+HALVINGS = 30
+LEAST_SHARE = 0.2  # of a gap, below which Newton's method does not begin
 RATE = "layer_rate"  # in a state's memory: d ln(gap)/dt of the contact points [1/s]
-# change of the gaps relative to the gaps, and to what they are a difference of
-GAP_TOLERANCE, ROUNDING = (1e-11, 1e-15)
+# Newton's method ends at such changes of the gaps.
+GAP_TOLERANCE = 1e-11  # relative to the gaps
+ROUNDING = 1e-15  # relative to the displacements that a gap is a difference of
 
 
 @dataclass(frozen=True)
@@ -90,7 +93,13 @@ class BoundaryLayer(Midpoint):
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
         """Return the state as it is.
 
-        It raises InputError where the layer would have to begin behind the obstacle.
+        Args:
+            problem: the problem of the run.
+            state: with which the run begins.
+            dt: first time step [s].
+
+        Raises:
+            InputError: the layer would have to begin behind the obstacle.
         """
         surface = problem.surface
         gap = surface.everywhere(surface.gap(state.t) - surface.normal_values(state.u))
@@ -106,7 +115,17 @@ class BoundaryLayer(Midpoint):
     def step(
         self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
     ) -> StepProblem:
-        """Prepare the midpoint step with the layer's reactions among the loads."""
+        """Prepare the midpoint step with the layer's reactions among the loads. Collective.
+
+        Args:
+            problem: the problem of the run.
+            state: at the beginning of the step.
+            A: matrix of the step.
+            dt: time step [s].
+
+        Raises:
+            StepFailure: a gap that is closed, or Newton's method for the gaps fails.
+        """
         step = super().step(problem, state, A, dt)
         surface = problem.surface
         if surface.total == 0:
@@ -120,31 +139,43 @@ class BoundaryLayer(Midpoint):
                 f"step {step.k} at t = {step.t:.6g} s begins with a gap of {-closed:.1e} m, a "
                 f"rounding error beside displacements of {away:.1e} m: make the layer wider"
             )
+
+        # The gaps of all ranks: the old ones, those of the step without layer, and the old rates.
         free = step.bound - surface.normal_values(A.factor.solve(step.b))
         rate = self._rate(problem, state, old)
         values = surface.everywhere(np.column_stack([old, free, rate, surface.weights]))
         old, free, rate, weights = (np.ascontiguousarray(column) for column in values.T)
+
+        # The pressures where some gap is inside the layer, at the beginning or at the end.
         pressure = np.zeros(surface.total)
         if min(old.min(), free.min()) < self.law.layer.width:
-            kept: WeakKeyDictionary[EffectiveMatrix, Array] = problem.equations.cached(
+            compliances: WeakKeyDictionary[EffectiveMatrix, Array] = problem.equations.cached(
                 "layer", WeakKeyDictionary
             )
-            if A not in kept:  # B A⁻¹ Bᵀ (m, m), made once for every A
-                kept[A] = np.asarray(Condensed().prepare(A, surface, step.scale).delassus)
-            G = kept[A] * (step.scale * weights)
+            if A not in compliances:  # B A⁻¹ Bᵀ (m, m), made once for every A
+                condensed = Condensed().prepare(A, surface, step.scale)
+                compliances[A] = np.asarray(condensed.delassus)
+            G = compliances[A] * (step.scale * weights)
             pressure = self._pressure(step, G, free, old, rate, dt)
+
+        # They are loads of the step, which has no contact of its own any more.
         reaction = surface.weights * pressure[surface.slots]
         b = step.b - step.scale * surface.reaction_load(reaction, len(step.b))
-        return LayeredStep(
-            **vars(step) | {"b": b, "active": np.zeros(surface.count, dtype=bool)}, layer=reaction
-        )
+        fields = vars(step) | {"b": b, "active": np.zeros(surface.count, dtype=bool)}
+        return LayeredStep(**fields, layer=reaction)
 
     def _rate(self, problem: ContactProblem, state: State, gap: Array) -> Array:
-        """ẏ = w_0 [1/s]: carried inside the layer, from the velocities outside."""
+        """Return ẏ = w_0 (m,) [1/s]: carried inside the layer, from the velocities outside.
+
+        Args:
+            problem: the problem of the run.
+            state: at the beginning of the step.
+            gap: (m,) at the beginning of the step [m].
+        """
         surface = problem.surface
         rate = -surface.normal_values(state.v) / gap
-        kept = surface.normal_values(state.memory[RATE]) if RATE in state.memory else rate
-        return np.where(gap < self.law.layer.width, kept, rate)
+        carried = surface.normal_values(state.memory[RATE]) if RATE in state.memory else rate
+        return np.where(gap < self.law.layer.width, carried, rate)
 
     def _pressure(
         self, step: StepProblem, G: Array, free: Array, old: Array, rate: Array, dt: float
@@ -152,15 +183,26 @@ class BoundaryLayer(Midpoint):
         """Return p̄ (m,) of gap = free + G p̄(gap).
 
         Newton's method solves it, in steps that leave a tenth of every gap at least.
+
+        Args:
+            step: for messages.
+            G: (m, m) gaps per pressure [m/Pa].
+            free: (m,) gaps at the end of the step without the layer [m].
+            old: (m,) gaps at its beginning [m].
+            rate: (m,) w_0 [1/s].
+            dt: time step [s].
         """
         law = self.law
-        rho = old * np.maximum(1.0 + dt * rate, 0.2)
+        rho = old * np.maximum(1.0 + dt * rate, LEAST_SHARE)
         p, slope = law.mean_pressure(rho, old, rate, dt)
         residual = rho - free - G @ p
         for _ in range(NEWTON_STEPS):
             change = -np.linalg.solve(np.eye(len(rho)) - G * slope, residual)
             if np.all(np.abs(change) <= GAP_TOLERANCE * rho + ROUNDING * np.abs(free)):
                 return p
+
+            # Take the largest share of the change that keeps the gaps open, and halve it until the
+            # residual falls.
             share = 1.0 / max(1.0, float(np.max(-change / (0.9 * rho))))
             size = float(np.linalg.norm(residual))
             for _ in range(HALVINGS):
@@ -183,22 +225,28 @@ class BoundaryLayer(Midpoint):
         result: StepResult,
         dt: float,
     ) -> State:
-        """Return the midpoint's state.
+        """Return the midpoint's state, whose reactions are the layer's.
 
-        Its reactions are the layer's, its active points those inside the layer.
+        Its active points are those inside the layer.
+
+        Args:
+            problem: the problem of the run.
+            state: at the beginning of the step.
+            step: as ``step`` has prepared it.
+            result: of the solver.
+            dt: time step [s].
         """
         new = super().finish(problem, state, step, result, dt)
         reaction = step.layer if isinstance(step, LayeredStep) else None
         if reaction is None:
             return new
+
+        # w_1 of the midpoint rule in ln(gap). It is kept as a vector of unknowns, since these pass
+        # through checkpoints.
         surface = problem.surface
-        gap, old = (
-            surface.gap(t) - surface.normal_values(u)
-            for t, u in ((step.t, new.u), (state.t, state.u))
-        )
+        gap = surface.gap(step.t) - surface.normal_values(new.u)
+        old = surface.gap(state.t) - surface.normal_values(state.u)
         rate = 2.0 / dt * np.log(np.maximum(gap / old, 1e-300)) - self._rate(problem, state, old)
-        # vectors of unknowns pass through checkpoints
         memory = {RATE: surface.reaction_load(rate, len(new.u))}
-        return replace(
-            new, r_n=new.r_n + reaction, active=gap < self.law.layer.width, memory=memory
-        )
+        active = gap < self.law.layer.width
+        return replace(new, r_n=new.r_n + reaction, active=active, memory=memory)

@@ -5,6 +5,7 @@ There is an event at every crossing of the layer's edge rho = b.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -27,8 +28,10 @@ class LayerContact:
     """Describe a passage through the layer.
 
     Args:
-        start, end: times of entry and exit [s].
-        rate_in, rate_out: ρ̇ there [m/s], negative on the way in.
+        start: time of entry [s].
+        end: time of exit [s].
+        rate_in: ρ̇ at entry [m/s], negative.
+        rate_out: ρ̇ at exit [m/s], positive.
         deepest: the least distance [m].
         turned: its time [s].
     """
@@ -57,7 +60,8 @@ class Trajectory:
 
     Args:
         t: times (m,) [s].
-        q, v: coordinates (m, n_q) and velocities (m, n), in the units of the system.
+        q: coordinates (m, n_q), in the units of the system.
+        v: velocities (m, n), likewise.
         rho: distances (m,) [m].
         reaction: lambda (m,) [N], positive away from the obstacle.
         contacts: the passages that are completed.
@@ -117,7 +121,8 @@ def layer_motion(
     )
     instance(owner, "layer", layer, Layer, "give a Layer")
     instance(owner, "metric", metric, Metric, "give Metric.DOMINANT, FULL, BLENDED or FLAT")
-    q, v = array(owner, "q0", q0, (None,)), array(owner, "v0", v0, (None,))
+    q = array(owner, "q0", q0, (None,))
+    v = array(owner, "v0", v0, (None,))
     system.check(q, v)
     number(owner, "t_end", t_end, positive=True, unit="s")
     optional(whole, owner, "contacts", contacts, least=1)
@@ -129,7 +134,9 @@ def layer_motion(
             f"the motion starts at distance rho = {rho:g}, outside the admissible set: start at "
             "rho > 0"
         )
-    passages = _Passages(system, layer, metric, rtol, refine)
+
+    # From crossing to crossing. A body on the edge is inside if it is on its way in.
+    passages = _Passages(system, layer, metric, rtol=rtol, refine=refine)
     inside = rho < layer.width or (rho == layer.width and system.normal_rate(q, v) < 0.0)
     t = 0.0
     with one_sentence():
@@ -141,15 +148,27 @@ def layer_motion(
     return passages.trajectory()
 
 
-def passage(
+def cross_layer(
     layer: Layer, mass: float, speed: float, metric: Metric, *, rtol: float, refine: int = 1
 ) -> Trajectory:
-    """Return how ``mass`` [kg] on a line crosses the layer.
+    """Return how a particle on a line crosses the layer.
 
-    It is entered with ``speed`` [m/s]; it raises InputError if it stays.
+    Args:
+        layer: the law.
+        mass: of the particle [kg].
+        speed: with which it enters [m/s].
+        metric: the reading of the law.
+        rtol: relative tolerance, as for ``layer_motion``.
+        refine: rows for each step of the integration, likewise.
+
+    Returns:
+        The motion, with one contact.
+
+    Raises:
+        InputError: the particle stays in the layer.
     """
     particle = ConstrainedSystem(np.array([[mass]]), lambda q: float(q[0]), lambda q: np.ones(1))
-    found = layer_motion(
+    trajectory = layer_motion(
         particle,
         layer,
         q0=np.array([layer.width]),
@@ -160,28 +179,38 @@ def passage(
         rtol=rtol,
         refine=refine,
     )
-    if not found.contacts:
+    if not trajectory.contacts:
         raise InputError("the layer holds the body back for ever: give it more k or less c")
-    return found
+    return trajectory
 
 
 class _Passages:
-    """Flights and passages through the layer one after the other.
+    """Integrate flights and passages through the layer, one after the other.
 
     The unknowns are v and q - q_start since the last crossing, over the time since: 1e-8 m is
     resolved beside 1 m.
+
+    Attributes:
+        contacts: the passages that are completed.
     """
 
     def __init__(
-        self, system: ConstrainedSystem, layer: Layer, metric: Metric, rtol: float, refine: int
+        self, system: ConstrainedSystem, layer: Layer, metric: Metric, *, rtol: float, refine: int
     ) -> None:
-        self._system, self._layer, self._metric, self._rtol, self._refine = (
-            system,
-            layer,
-            metric,
-            rtol,
-            refine,
-        )
+        """Begin without any motion.
+
+        Args:
+            system: masses, forces and the distance to the obstacle.
+            layer: the law.
+            metric: the reading of the law.
+            rtol: relative tolerance of the integration.
+            refine: rows of the trajectory for each step of the integration.
+        """
+        self._system = system
+        self._layer = layer
+        self._metric = metric
+        self._rtol = rtol
+        self._refine = refine
         self._parts: list[tuple[Array, Array, Array, Array, Array]] = []
         self._evaluations = Evaluations()
         self.contacts: list[LayerContact] = []
@@ -189,17 +218,69 @@ class _Passages:
     def run(
         self, start: float, t_end: float, q: Array, v: Array, inside: bool
     ) -> tuple[float, Array, Array, bool]:
-        """Integrate to the next crossing of the edge; (t, q, v, whether there was one)."""
+        """Integrate to the next crossing of the edge, or to the end.
+
+        Args:
+            start: time of the last crossing [s].
+            t_end: end of the motion [s].
+            q: coordinates (n_q,) at the start.
+            v: velocities (n,) at the start.
+            inside: whether this is a passage through the layer.
+
+        Returns:
+            Time, coordinates and velocities at the end, and whether the edge was crossed.
+
+        Raises:
+            StepFailure: the integrator stops; the message names the time.
+        """
         system = self._system
         n = len(q)
-        layer = (
-            self._layer.at(abs(system.normal_rate(q, v)))
-            if inside and self._layer.speed is None
-            else self._layer
-        )
-        width = layer.width
+        layer = self._layer
+        if inside and layer.speed is None:
+            layer = layer.at(abs(system.normal_rate(q, v)))
+        solution = self._integrate(start, t_end, q, v, layer, inside)
+        places = q + solution.y[:n].T
+        speeds = solution.y[n:].T
+
+        # Rows at the integrator's steps, and at even parts of them by its own interpolation.
+        steps = np.arange(len(solution.t))
+        parts = np.arange(self._refine * (len(solution.t) - 1) + 1) / self._refine
+        t = np.interp(parts, steps, solution.t)
+        y = solution.sol(t) if self._refine > 1 else solution.y
+        self._keep(start + t, q + y[:n].T, y[n:].T, layer, inside)
+
+        # A passage that is completed; it is deepest where it turned, or at the edge.
+        end = start + float(solution.t[-1])
+        crossed = solution.status == 1
+        if inside and crossed:
+            turns = []
+            for state, time in zip(solution.y_events[1], solution.t_events[1], strict=True):
+                turns.append((float(system.rho(q + state[:n])), float(time)))
+            deepest, t_deepest = min(turns, default=(layer.width, 0.0))
+            contact = LayerContact(
+                start=start,
+                end=end,
+                rate_in=system.normal_rate(q, v),
+                rate_out=system.normal_rate(places[-1], speeds[-1]),
+                deepest=deepest,
+                turned=start + t_deepest,
+            )
+            self.contacts.append(contact)
+        return end, places[-1], speeds[-1], crossed
+
+    def _integrate(
+        self, start: float, t_end: float, q: Array, v: Array, layer: Layer, inside: bool
+    ) -> Any:
+        """Return what ``solve_ivp`` makes of (q - q_start, v) over the time since the start.
+
+        Its first event is the crossing of the edge, which ends it; its second one a turn, where the
+        distance is least. The arguments are those of ``run``, and the layer with its speed.
+        """
+        system = self._system
+        n = len(q)
 
         def rates(t: float, y: Array) -> Array:
+            """Return the rates of the unknowns at a time since the start [s]."""
             self._evaluations.spend(start + t)
             place = q + y[:n]
             speed = y[n:]
@@ -207,66 +288,54 @@ class _Passages:
             return np.concatenate([system.velocity(place, speed), acceleration])
 
         def edge(t: float, y: Array) -> float:
+            """Return the distance from the edge [m], negative inside."""
             rho = float(system.rho(q + y[:n]))
             if not np.isfinite(rho):
                 raise StepFailure(
                     f"the distance rho(q) is {rho:g} at t = {start + t:.6g} s: return a finite "
                     "number"
                 )
-            return rho - width
+            return rho - layer.width
 
         def turn(t: float, y: Array) -> float:
+            """Return ρ̇ [m/s], which passes zero upwards at a turn."""
             return system.normal_rate(q + y[:n], y[n:])
 
         edge.terminal = True  # type: ignore[attr-defined]
         edge.direction = 1.0 if inside else -1.0  # type: ignore[attr-defined]
         turn.direction = 1.0  # type: ignore[attr-defined]
-        way = width if inside else max(width, float(np.max(np.abs(q))))
-        if not np.all(np.isfinite(rates(0.0, np.r_[np.zeros(n), v]))):
+        y0 = np.r_[np.zeros(n), v]
+        if not np.all(np.isfinite(rates(0.0, y0))):
             raise StepFailure(
                 f"the velocities or accelerations at t = {start:.6g} s are not finite: check what "
                 "the system's functions return there"
             )
-        most = float(np.max(np.abs(self._acceleration(start, q, v, layer, inside)[0])))
-        # the speed over the width; 1 where nothing moves
-        reached = float(np.sqrt(most * layer.width)) or 1.0
-        pace = max(float(np.max(np.abs(v))), layer.speed or 0.0, reached)
-        atol = self._rtol * np.r_[np.full(n, way), np.full(len(v), pace)]
-        found = solve_ivp(
+
+        # Absolute tolerances, of the size of the motion: lengths, and speeds. Of these is one that
+        # the acceleration gives over the width, or 1 where nothing moves.
+        size = layer.width if inside else max(layer.width, float(np.max(np.abs(q))))
+        acceleration, _ = self._acceleration(start, q, v, layer, inside)
+        most = float(np.max(np.abs(acceleration)))
+        speed_over_width = float(np.sqrt(most * layer.width)) or 1.0
+        speed = max(float(np.max(np.abs(v))), layer.speed or 0.0, speed_over_width)
+        atol = self._rtol * np.r_[np.full(n, size), np.full(len(v), speed)]
+        solution = solve_ivp(
             rates,
             (0.0, t_end - start),
-            np.r_[np.zeros(n), v],
+            y0,
             events=(edge, turn),
             atol=atol,
             rtol=self._rtol,
             method="DOP853",
             dense_output=self._refine > 1,
         )
-        if found.status < 0:
+        if solution.status < 0:
             raise StepFailure(
-                f"the motion could not be integrated beyond t = {start + found.t[-1]:.6g} s at rho "
-                f"= {system.rho(q + found.y[:n, -1]):.3g}: give a larger rtol ({found.message})"
+                f"the motion could not be integrated beyond t = {start + solution.t[-1]:.6g} s at "
+                f"rho = {system.rho(q + solution.y[:n, -1]):.3g}: give a larger rtol "
+                f"({solution.message})"
             )
-        places = q + found.y[:n].T
-        speeds = found.y[n:].T
-        t = np.interp(
-            np.arange(self._refine * (len(found.t) - 1) + 1) / self._refine,
-            np.arange(len(found.t)),
-            found.t,
-        )
-        y = found.sol(t) if self._refine > 1 else found.y
-        self._keep(start + t, q + y[:n].T, y[n:].T, layer, inside)
-        crossed = found.status == 1
-        if inside and crossed:
-            rate = system.normal_rate(q, v), system.normal_rate(places[-1], speeds[-1])
-            turns = zip(found.y_events[1], found.t_events[1], strict=True)
-            deepest, when = min(
-                ((float(system.rho(q + y[:n])), float(t)) for y, t in turns), default=(width, 0.0)
-            )
-            self.contacts.append(
-                LayerContact(start, start + float(found.t[-1]), *rate, deepest, start + when)
-            )
-        return start + float(found.t[-1]), places[-1], speeds[-1], crossed
+        return solution
 
     def _acceleration(
         self, t: float, q: Array, v: Array, layer: Layer, inside: bool
@@ -275,6 +344,13 @@ class _Passages:
 
         They are NaN where a trial stage has left the admissible set, which makes the integrator
         step back.
+
+        Args:
+            t: time [s].
+            q: coordinates (n_q,).
+            v: velocities (n,).
+            layer: the law, with its speed.
+            inside: whether this is a passage through the layer.
         """
         free, along, g, normal = self._system.accelerations(t, q, v)
         if not inside:
@@ -286,11 +362,23 @@ class _Passages:
         return free + along * reaction, reaction
 
     def _keep(self, t: Array, q: Array, v: Array, layer: Layer, inside: bool) -> None:
-        rho = np.array([float(self._system.rho(row)) for row in q])
-        reaction = [self._acceleration(*row, layer, inside)[1] for row in zip(t, q, v, strict=True)]
-        self._parts.append((t, q, v, rho, np.array(reaction)))
+        """Keep the rows of a part of the motion, with their distances and reactions.
+
+        Args:
+            t: times (m,) [s].
+            q: coordinates (m, n_q).
+            v: velocities (m, n).
+            layer: the law, with its speed.
+            inside: whether this is a passage through the layer.
+        """
+        rho = np.array([float(self._system.rho(place)) for place in q])
+        reaction = np.empty(len(t))
+        for row in range(len(t)):
+            _, reaction[row] = self._acceleration(t[row], q[row], v[row], layer, inside)
+        self._parts.append((t, q, v, rho, reaction))
 
     def trajectory(self) -> Trajectory:
-        """Everything so far."""
-        t, q, v, rho, reaction = (np.concatenate(part) for part in zip(*self._parts, strict=True))
+        """Return the motion so far."""
+        columns = zip(*self._parts, strict=True)
+        t, q, v, rho, reaction = (np.concatenate(column) for column in columns)
         return Trajectory(t, q, v, rho, reaction, tuple(self.contacts))

@@ -160,8 +160,8 @@ def channel_grid(
     notch = (x[1] < right) & (right < x[4]) & (up > y[1])
     inside = (x[2] < right) & (right < x[3]) & (up > y[2])
     middle = 0.5 * (x[1] + x[4])
-    points, cells, corner = _body(xs, ys, notch & ~inside, middle, triangles)
-    soil_points, soil_cells, soil_corner = _body(xs, ys, ~notch, middle, triangles)
+    points, cells, corner = _mesh_body(xs, ys, notch & ~inside, middle, triangles)
+    soil_points, soil_cells, soil_corner = _mesh_body(xs, ys, ~notch, middle, triangles)
 
     # Boundary groups, as lines (x, y) of the grid.
     interface = {"left": [(x[1:2], y[1:])], "base": [(x[1:5], y[1:2])], "right": [(x[4:5], y[1:])]}
@@ -179,7 +179,7 @@ def channel_grid(
     facets = {}
     for number, table in ((corner, channel_lines), (soil_corner, soil_lines)):
         for name, lines in table.items():
-            on_lines = [_along(xs, ys, number, *line) for line in lines]
+            on_lines = [_collect_facets(xs, ys, number, *line) for line in lines]
             facets[name] = np.concatenate(on_lines)
 
     # Both bodies in one mesh, the channel first.
@@ -203,7 +203,7 @@ def _divide(places: Sequence[float], size: float) -> Array:
     return np.append(np.concatenate(parts), places[-1])
 
 
-def _body(
+def _mesh_body(
     xs: Array, ys: Array, chosen: Mask, middle: float, triangles: bool
 ) -> tuple[Array, Rows, Rows]:
     """Mesh the chosen boxes of a grid.
@@ -223,24 +223,23 @@ def _body(
     columns_around = np.stack([column, column + 1, column + 1, column])
     rows_around = np.stack([row, row, row + 1, row + 1])
     around = (columns_around, rows_around)
-    used = np.zeros((len(xs), len(ys)), dtype=bool)
-    used[around] = True
-    number = np.where(used, np.cumsum(used).reshape(used.shape) - 1, -1)
-    place = np.argwhere(used)
+    has_point = np.zeros((len(xs), len(ys)), dtype=bool)
+    has_point[around] = True
+    number = np.where(has_point, np.cumsum(has_point).reshape(has_point.shape) - 1, -1)
+    place = np.argwhere(has_point)
     boxes = number[around].T
     if triangles:
         rising = [[0, 1, 2], [0, 2, 3]]
         falling = [[0, 1, 3], [1, 2, 3]]
         on_left = 0.5 * (xs[column] + xs[column + 1]) < middle
         boxes = np.where(on_left[:, None, None], boxes[:, rising], boxes[:, falling]).reshape(-1, 3)
-    return (
-        np.column_stack([xs[place[:, 0]], ys[place[:, 1]]]),
-        boxes.astype(np.int64),
-        number.astype(np.int64),
-    )
+    points = np.column_stack([xs[place[:, 0]], ys[place[:, 1]]])
+    return points, boxes.astype(np.int64), number.astype(np.int64)
 
 
-def _along(xs: Array, ys: Array, number: Rows, x: Sequence[float], y: Sequence[float]) -> Rows:
+def _collect_facets(
+    xs: Array, ys: Array, number: Rows, x: Sequence[float], y: Sequence[float]
+) -> Rows:
     """Return the facets of a body on a straight line of the grid.
 
     Args:

@@ -11,7 +11,7 @@ import numpy as np
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
-from vi_contact.meshes.rows import CORNERS, Mask, Rows, cell_sides, found_in, number_alike
+from vi_contact.meshes.rows import CORNERS, Mask, Rows, are_among, cell_sides, number_alike
 
 _ROUND_OFF = 1024 * np.finfo(float).eps
 
@@ -32,8 +32,9 @@ def check_cells(points: Array, cells: Rows, cell: str, source: str) -> None:
     edges = x[:, :, 1:] - x[:, :, :1]
     det = np.linalg.det(edges)
     d = points.shape[1]
+
+    # Error of det J from the rounding of coordinates.
     longest = np.sqrt((edges**2).sum(axis=-1)).max(axis=(1, 2))
-    # error of det from the rounding of coordinates
     noise = _ROUND_OFF * np.abs(points).max() * longest ** (d - 1)
     flat = np.abs(det).min(axis=1) <= noise
     twisted = ~flat & (det.min(axis=1) < 0.0) & (det.max(axis=1) > 0.0)
@@ -54,7 +55,7 @@ def check_folds(points: Array, cells: Rows, cell: str, source: str) -> None:
     (number,) = number_alike(sides)
     x = points[sides[:, : points.shape[1]]]
     centres = points[cells].mean(axis=1)
-    height = ((centres[owner] - x[:, 0]) * _normals(x)).sum(axis=1)
+    height = ((centres[owner] - x[:, 0]) * _compute_normals(x)).sum(axis=1)
 
     # Of two cells on either side of a facet the signs add up to zero.
     count = np.bincount(number)
@@ -77,7 +78,7 @@ def check_sides(groups: dict[str, Rows], cells: Rows, cell: str, source: str) ->
     all_sides, _ = cell_sides(cells, cell)
     sides, *named = number_alike(all_sides, *groups.values())
     for name, numbers in zip(groups, named, strict=True):
-        missing = int(np.sum(~found_in(numbers, sides)))
+        missing = int(np.sum(~are_among(numbers, sides)))
         if missing:
             facets = "1 facet that is" if missing == 1 else f"{missing} facets that are"
             raise InputError(
@@ -86,7 +87,7 @@ def check_sides(groups: dict[str, Rows], cells: Rows, cell: str, source: str) ->
             )
 
 
-def _normals(x: Array) -> Array:
+def _compute_normals(x: Array) -> Array:
     """Return the normals (n, d) of facets through their first d vertices (n, d, d).
 
     They have any length and direction.
@@ -99,12 +100,12 @@ def _normals(x: Array) -> Array:
     return np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
 
 
-def refuse_cells(bad: Mask, what: str, points: Array, cells: Rows, source: str) -> None:
+def refuse_cells(bad: Mask, fault: str, points: Array, cells: Rows, source: str) -> None:
     """Raise InputError that counts the bad cells and says where the first one is.
 
     Args:
         bad: (n_cells,), the cells to refuse.
-        what: what they have.
+        fault: that they have.
         points: (n_points, d) [m].
         cells: (n_cells, n_vertices), rows of points.
         source: name of the mesh.
@@ -115,4 +116,4 @@ def refuse_cells(bad: Mask, what: str, points: Array, cells: Rows, source: str) 
     where = ", ".join(f"{x:.6g}" for x in centre)
     number = bad.sum()
     who = f"1 cell of {source} has" if number == 1 else f"{number} cells of {source} have"
-    raise InputError(f"{who} {what}, first at ({where}): mesh it again")
+    raise InputError(f"{who} {fault}, first at ({where}): mesh it again")

@@ -15,7 +15,7 @@ from vi_contact.core.algebra import Array
 from vi_contact.core.checks import at, shown
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.extract import MeshArrays, Source, add_arrays, arrays_of
-from vi_contact.meshes.rows import Mask, Rows, cell_sides, connected, number_alike, vertex_count
+from vi_contact.meshes.rows import Mask, Rows, cell_sides, number_alike, number_parts, vertex_count
 
 
 @dataclass(frozen=True)
@@ -101,35 +101,29 @@ def cut_open(
             "CutOpen: give group=, the name of an inner boundary, or between=, two groups of cells"
         )
     if between is not None:
-        arrays, group, inside = _joint(arrays, between, inside, towards)
+        arrays, group, inside = _make_joint(arrays, between, inside, towards)
     assert group is not None
-    facets = _group(arrays, group)
-    for name in (f"{group}_1", f"{group}_2"):
-        if name in arrays.facet_groups or name in arrays.cell_groups:
-            raise InputError(
-                f"cut of '{group}': the mesh has a group '{name}' already, the name of a side of "
-                "the cut: give one of them another name"
-            )
-    if (inside is None) == (towards is None):
-        raise InputError(
-            f"cut of '{group}': give its first side, either by inside=a cell group or by towards=a "
-            "vector"
-        )
+    facets = _get_facets(arrays, group)
+    _refuse_unclear_sides(arrays, group, inside, towards)
 
     # Sides of cells, with equal numbers for the same facet; every inner facet has two of them.
     sides, owner = cell_sides(arrays.cells, arrays.cell)
     side, *numbers = number_alike(sides, *arrays.facet_groups.values())
-    named = dict(zip(arrays.facet_groups, numbers, strict=True))
-    wanted = named[group]
-    one, other = _twins(side)
-    cut = np.isin(side[one], wanted)
-    if cut.sum() < len(np.unique(wanted)):
+    numbers_of_group = dict(zip(arrays.facet_groups, numbers, strict=True))
+    boundary = numbers_of_group[group]
+    first_twin, second_twin = _find_twins(side)
+    cut = np.isin(side[first_twin], boundary)
+    if cut.sum() < len(np.unique(boundary)):
         raise InputError(
             f"boundary group '{group}' has facets without cells on both sides: cut inner "
             "boundaries only"
         )
-    first = _on_first_side(arrays, group, owner[one[cut]], owner[other[cut]], inside, towards)
-    cells, points = _double_nodes(arrays, np.unique(facets), sides, owner, one[~cut], other[~cut])
+    is_first = _tell_first_side(
+        arrays, group, owner[first_twin[cut]], owner[second_twin[cut]], inside, towards
+    )
+    cells, points = _double_nodes(
+        arrays, np.unique(facets), sides, owner, first_twin[~cut], second_twin[~cut]
+    )
 
     def renew(rows: Rows, number: Rows, on: Rows) -> Rows:
         """Return facets as the cells beside them know them now.
@@ -149,18 +143,45 @@ def cut_open(
     for name, rows in arrays.facet_groups.items():
         if name == group:
             continue
-        renewed = renew(rows, named[name], np.flatnonzero(np.isin(side, named[name])))
+        number = numbers_of_group[name]
+        renewed = renew(rows, number, np.flatnonzero(np.isin(side, number)))
         (alike,) = number_alike(renewed)
         _, first_of_each = np.unique(alike, return_index=True)
         groups[name] = renewed[np.sort(first_of_each)]
-    side_1 = np.where(first, one[cut], other[cut])
-    side_2 = np.where(first, other[cut], one[cut])
-    groups[f"{group}_1"] = renew(facets, wanted, side_1)
-    groups[f"{group}_2"] = renew(facets, wanted, side_2)
+
+    # The cut boundary becomes two groups, of the cells on either side.
+    side_1 = np.where(is_first, first_twin[cut], second_twin[cut])
+    side_2 = np.where(is_first, second_twin[cut], first_twin[cut])
+    groups[f"{group}_1"] = renew(facets, boundary, side_1)
+    groups[f"{group}_2"] = renew(facets, boundary, side_2)
     return replace(arrays, points=points, cells=cells, facet_groups=groups)
 
 
-def _twins(number: Rows) -> tuple[Rows, Rows]:
+def _refuse_unclear_sides(
+    arrays: MeshArrays, group: str, inside: str | None, towards: Sequence[float] | None
+) -> None:
+    """Raise InputError unless the names of both sides are free, and it is said which is the first.
+
+    Args:
+        arrays: the mesh.
+        group: name of the boundary.
+        inside: the group of cells on side 1, or None.
+        towards: the vector from side 1 to side 2, or None.
+    """
+    for name in (f"{group}_1", f"{group}_2"):
+        if name in arrays.facet_groups or name in arrays.cell_groups:
+            raise InputError(
+                f"cut of '{group}': the mesh has a group '{name}' already, the name of a side of "
+                "the cut: give one of them another name"
+            )
+    if (inside is None) == (towards is None):
+        raise InputError(
+            f"cut of '{group}': give its first side, either by inside=a cell group or by towards=a "
+            "vector"
+        )
+
+
+def _find_twins(number: Rows) -> tuple[Rows, Rows]:
     """Return the places of equal numbers, of which no more than two are alike."""
     order = np.argsort(number, kind="stable")
     inner = np.flatnonzero(np.diff(number[order]) == 0)
@@ -182,13 +203,13 @@ def weld(arrays: MeshArrays, first: str, second: str) -> MeshArrays:
     """
     from scipy.spatial import cKDTree  # late: it takes a while
 
-    one = np.unique(_group(arrays, first))
-    two = np.unique(_group(arrays, second))
+    staying = np.unique(_get_facets(arrays, first))
+    replaced = np.unique(_get_facets(arrays, second))
     size = float(np.ptp(arrays.points, axis=0).max())
-    tree = cKDTree(arrays.points[one])
-    distance, nearest = tree.query(arrays.points[two])
-    partners = tree.query_ball_point(arrays.points[two], 1e-9 * size, return_length=True)
-    several = two[partners > 1]
+    tree = cKDTree(arrays.points[staying])
+    distance, nearest = tree.query(arrays.points[replaced])
+    partners = tree.query_ball_point(arrays.points[replaced], 1e-9 * size, return_length=True)
+    several = replaced[partners > 1]
     if len(several):
         raise InputError(
             f"group '{first}' has several nodes at {at(arrays.points[several[0]])}, of bodies that "
@@ -196,39 +217,44 @@ def weld(arrays: MeshArrays, first: str, second: str) -> MeshArrays:
             f"give '{second}' first"
         )
     if distance.max(initial=0.0) > 1e-9 * size:
-        where = at(arrays.points[two[np.argmax(distance)]])
+        where = at(arrays.points[replaced[np.argmax(distance)]])
         raise InputError(
             f"group '{second}' has a node at {where}, {distance.max():.3g} m away from every node "
             f"of '{first}': weld only sides that are divided alike"
         )
     target = np.arange(len(arrays.points))
-    target[two] = one[nearest]
-    kept, number = np.unique(target, return_inverse=True)
+    target[replaced] = staying[nearest]
+    remaining, number = np.unique(target, return_inverse=True)
     groups = {name: number[rows] for name, rows in arrays.facet_groups.items()}
-    return replace(
-        arrays, points=arrays.points[kept], cells=number[arrays.cells], facet_groups=groups
-    )
+    points = arrays.points[remaining]
+    return replace(arrays, points=points, cells=number[arrays.cells], facet_groups=groups)
 
 
-def _group(arrays: MeshArrays, name: str) -> Rows:
+def _get_facets(arrays: MeshArrays, name: str) -> Rows:
     """Return the facets of a boundary group, or raise InputError if there is none."""
     if arrays.cells.shape[1] > vertex_count(arrays.cell):
         raise InputError(
             "a mesh of second order cannot be cut or welded: mesh it with Mesh.ElementOrder = 1"
         )
     if name not in arrays.facet_groups:
-        has = ", ".join(arrays.facet_groups) or "none"
+        names = ", ".join(arrays.facet_groups) or "none"
         raise InputError(
-            f"mesh has no boundary group '{name}'; it has {has}: name it in Gmsh as a physical "
+            f"mesh has no boundary group '{name}'; it has {names}: name it in Gmsh as a physical "
             "group"
         )
     return arrays.facet_groups[name]
 
 
-def _joint(
+def _make_joint(
     arrays: MeshArrays, between: Sequence[str], inside: str | None, towards: Sequence[float] | None
 ) -> tuple[MeshArrays, str, str]:
     """Make a boundary group of all facets between two cell groups.
+
+    Args:
+        arrays: the mesh.
+        between: names of the two groups of cells, side 1 first.
+        inside: has to be None.
+        towards: has to be None.
 
     Returns:
         The mesh with this group, the name of the group, the cell group on side 1.
@@ -261,9 +287,9 @@ def _joint(
         )
     sides, owner = cell_sides(arrays.cells[:, : vertex_count(arrays.cell)], arrays.cell)
     (number,) = number_alike(sides)
-    one, other = _twins(number)
-    forward = first[owner[one]] & second[owner[other]]
-    backward = second[owner[one]] & first[owner[other]]
+    first_twin, second_twin = _find_twins(number)
+    forward = first[owner[first_twin]] & second[owner[second_twin]]
+    backward = second[owner[first_twin]] & first[owner[second_twin]]
     across = forward | backward
     if not across.any():
         raise InputError(
@@ -271,15 +297,15 @@ def _joint(
             "nothing to cut: bodies with nodes of their own touch by their boundaries, "
             "contact_pair(…)"
         )
-    groups = arrays.facet_groups | {joint: sides[one[across]]}
+    groups = arrays.facet_groups | {joint: sides[first_twin[across]]}
     return replace(arrays, facet_groups=groups), joint, names[0]
 
 
-def _on_first_side(
+def _tell_first_side(
     arrays: MeshArrays,
     group: str,
-    one: Rows,
-    other: Rows,
+    first_cell: Rows,
+    second_cell: Rows,
     inside: str | None,
     towards: Sequence[float] | None,
 ) -> Mask:
@@ -288,8 +314,8 @@ def _on_first_side(
     Args:
         arrays: the mesh.
         group: name of the boundary.
-        one: (n,), first cell of every cut facet.
-        other: (n,), second cell of every cut facet.
+        first_cell: (n,), one cell of every cut facet.
+        second_cell: (n,), its other cell.
         inside: the group of cells on side 1.
         towards: the vector from side 1 to side 2; it is read where ``inside`` is None.
     """
@@ -299,26 +325,26 @@ def _on_first_side(
                 f"mesh has no cell group '{inside}'; it has {', '.join(arrays.cell_groups)}"
             )
         mask = arrays.cell_groups[inside]
-        if np.any(mask[one] == mask[other]):
+        if np.any(mask[first_cell] == mask[second_cell]):
             raise InputError(
                 f"cell group '{inside}' is not on one side of '{group}' only: give towards=vector "
                 "instead"
             )
-        return np.asarray(mask[one])
+        return np.asarray(mask[first_cell])
     way = np.asarray(towards, dtype=float)
     centres = arrays.points[arrays.cells].mean(axis=1)
-    across = centres[other] - centres[one]
+    across = centres[second_cell] - centres[first_cell]
     ahead = across @ way
     if np.any(np.abs(ahead) <= 1e-9 * np.linalg.norm(across, axis=1) * np.linalg.norm(way)):
-        given = tuple(float(x) for x in way)
+        vector = tuple(float(x) for x in way)
         raise InputError(
-            f"towards={given} runs along '{group}' somewhere: give inside=a cell group instead"
+            f"towards={vector} runs along '{group}' somewhere: give inside=a cell group instead"
         )
     return np.asarray(ahead > 0.0)
 
 
 def _double_nodes(
-    arrays: MeshArrays, nodes: Rows, sides: Rows, owner: Rows, one: Rows, other: Rows
+    arrays: MeshArrays, nodes: Rows, sides: Rows, owner: Rows, first: Rows, second: Rows
 ) -> tuple[Rows, Array]:
     """Give each node a copy for every part of its cells that facets connect.
 
@@ -327,8 +353,8 @@ def _double_nodes(
         nodes: (m,), nodes of the cut.
         sides: vertices of all sides of cells.
         owner: the cells of these sides.
-        one: sides, as rows of ``sides``, that hang together with those of ``other``.
-        other: the same number of sides.
+        first: sides, as rows of ``sides``, that hang together with those of ``second``.
+        second: the same number of sides.
 
     Returns:
         The cells and the points with the copies.
@@ -349,9 +375,9 @@ def _double_nodes(
 
     # Entries hang together across facets that are not cut. The part of the first cell around a node
     # keeps the node; all others get new ones, in the order of the old.
-    part = connected(len(key), entries_on(one), entries_on(other))
-    _, first = np.unique(node, return_index=True)
-    keeps = np.isin(part, part[first])
+    part = number_parts(len(key), entries_on(first), entries_on(second))
+    _, first_entry = np.unique(node, return_index=True)
+    keeps = np.isin(part, part[first_entry])
     _, number = np.unique(node[~keeps] * len(key) + part[~keeps], return_inverse=True)
     cells = arrays.cells.copy()
     cells[around[~keeps], column[~keeps]] = n + number

@@ -78,13 +78,13 @@ def arrays_from_script(mesh: MeshScript) -> MeshArrays:
     source = type(mesh).__name__
     grids: Sequence[Grid] = getattr(mesh, "grids", list)()
     if grids:
-        return _of_grids(grids, source)
+        return _join_grids(grids, source)
     with session() as gmsh:
         mesh.build(gmsh)
         return extract(gmsh, source)
 
 
-def _of_grids(grids: Sequence[Grid], source: str) -> MeshArrays:
+def _join_grids(grids: Sequence[Grid], source: str) -> MeshArrays:
     """Return the arrays that `extract` would find in a model of these grids."""
     points_of_grids = []
     cells_of_grids = []
@@ -134,30 +134,30 @@ def extract(gmsh: Any, source: str) -> MeshArrays:
     model = gmsh.model
     kinds, _, _ = model.mesh.getElements()
     d = max((model.mesh.getElementProperties(kind)[1] for kind in kinds), default=0)
-    body = _named_entities(model, d)
-    sides = _named_entities(model, d - 1)
-    both = body.keys() & sides.keys()
-    if both:
+    body = _find_entities(model, d)
+    sides = _find_entities(model, d - 1)
+    common = body.keys() & sides.keys()
+    if common:
         raise InputError(
-            f"{source} calls both cells and facets '{min(both)}': give one of the groups another "
+            f"{source} calls both cells and facets '{min(common)}': give one of the groups another "
             "name"
         )
     named = sorted(set(chain.from_iterable(body.values())))
-    elements = _elements(model, d, named or [entity for _, entity in model.getEntities(d)])
+    elements = _collect_elements(model, d, named or [entity for _, entity in model.getEntities(d)])
 
     # Points in the order of their tags, and cells as rows of them, each once.
-    cell, number, side = _kind(model, elements, d, source)
+    cell, number, side = _find_kind(model, elements, d, source)
     nodes, entity = elements[number]
     tags, cells = np.unique(nodes, return_inverse=True)
-    points = _flat(_coordinates(model, tags, source), d, source)
+    points = _drop_coordinates(_find_coordinates(model, tags, source), d, source)
     cells = cells.reshape(nodes.shape).astype(np.int64)
-    kept, position = _drop_repeats(cells)
-    cells = cells[kept]
+    first_rows, position = _drop_repeats(cells)
+    cells = cells[first_rows]
     corners = cells[:, : vertex_count(cell)]
     check_cells(points, corners, cell, source)
     check_folds(points, corners, cell, source)
     if cells.shape[1] > corners.shape[1]:
-        folded = _find_folded(model, number, entity, d)[kept]
+        folded = _find_folded(model, number, entity, d)[first_rows]
         refuse_cells(folded, "a fold between its curved sides", points, cells, source)
 
     cell_groups = {} if body else {"all": np.ones(len(cells), dtype=bool)}
@@ -166,15 +166,15 @@ def extract(gmsh: Any, source: str) -> MeshArrays:
         cell_groups[name][position[np.isin(entity, entities)]] = True
     facet_groups = {}
     for name, entities in sides.items():
-        what = f"boundary group '{name}' of {source}"
-        facets = _facets(model, entities, side, tags, points, what)
+        group = f"boundary group '{name}' of {source}"
+        facets = _collect_facets(model, entities, side, tags, points, group)
         if len(facets):
             facet_groups[name] = facets
     check_sides(facet_groups, corners, cell, source)
     return MeshArrays(cell, points, cells, cell_groups, facet_groups)
 
 
-def _named_entities(model: Any, dim: int) -> dict[str, list[int]]:
+def _find_entities(model: Any, dim: int) -> dict[str, list[int]]:
     """Return the entities of each physical group of a dimension.
 
     A group without a name is called by its number.
@@ -189,7 +189,7 @@ def _named_entities(model: Any, dim: int) -> dict[str, list[int]]:
     return groups
 
 
-def _elements(model: Any, dim: int, entities: Iterable[int]) -> _Elements:
+def _collect_elements(model: Any, dim: int, entities: Iterable[int]) -> _Elements:
     """Return the elements of the entities."""
     nodes_of_kind: dict[int, list[Rows]] = {}
     entities_of_kind: dict[int, list[int]] = {}
@@ -206,8 +206,15 @@ def _elements(model: Any, dim: int, entities: Iterable[int]) -> _Elements:
     return elements
 
 
-def _kind(model: Any, elements: _Elements, dim: int, source: str) -> tuple[str, int, int]:
-    """Return the one type of cell there is: UFL's name, Gmsh's number, that of its sides."""
+def _find_kind(model: Any, elements: _Elements, dim: int, source: str) -> tuple[str, int, int]:
+    """Return the one type of cell there is: UFL's name, Gmsh's number, that of its sides.
+
+    Args:
+        model: Gmsh's current model.
+        elements: by Gmsh's number of their kind.
+        dim: dimension of the cells.
+        source: name of the mesh in messages.
+    """
     if dim == 0 or not elements:
         raise InputError(f"{source} has no cells: mesh the geometry in Gmsh before saving it")
     known = {}
@@ -259,7 +266,7 @@ def _find_folded(model: Any, kind: int, entity: Rows, dim: int) -> Mask:
     return np.concatenate(folded)
 
 
-def _coordinates(model: Any, tags: Rows, source: str) -> Array:
+def _find_coordinates(model: Any, tags: Rows, source: str) -> Array:
     """Return the coordinates (n, 3) of the nodes with the given tags.
 
     The tags may start anywhere and have holes.
@@ -276,7 +283,7 @@ def _coordinates(model: Any, tags: Rows, source: str) -> Array:
     return points
 
 
-def _flat(points: Array, d: int, source: str) -> Array:
+def _drop_coordinates(points: Array, d: int, source: str) -> Array:
     """Return the first d coordinates; the others must be zero."""
     away = np.abs(points[:, d:]).max(initial=0.0)
     if away > 1e-9 * np.ptp(points, axis=0).max():
@@ -290,9 +297,9 @@ def _flat(points: Array, d: int, source: str) -> Array:
 
 
 def _drop_repeats(rows: Rows) -> tuple[Rows, Rows]:
-    """Return which rows are kept, and the place of every row among these.
+    """Return the first of all rows with the same members, and the place of every row among these.
 
-    Of rows with the same members the first is kept.
+    Both are numbers of rows.
     """
     (number,) = number_alike(rows)
     _, first, place = np.unique(number, return_index=True, return_inverse=True)
@@ -302,8 +309,8 @@ def _drop_repeats(rows: Rows) -> tuple[Rows, Rows]:
     return first[order], rank[place]
 
 
-def _facets(
-    model: Any, entities: list[int], kind: int, tags: Rows, points: Array, what: str
+def _collect_facets(
+    model: Any, entities: list[int], kind: int, tags: Rows, points: Array, group: str
 ) -> Rows:
     """Return the facets of a group as rows of points at their vertices, each once.
 
@@ -315,19 +322,19 @@ def _facets(
         kind: Gmsh's number of the sides of the cells.
         tags: of the nodes of the points, ascending.
         points: (n_points, d) [m].
-        what: name of the group in messages.
+        group: its name in messages.
 
     OpenCASCADE may copy a curve or surface when it bounds a body with it, and the named original is
     then meshed by itself, with nodes at the places of the body's (dolfinx#2456). Such a node stands
     for the one point at its place.
     """
     _, dimension, _, _, _, vertices, *_ = model.mesh.getElementProperties(kind)
-    elements = _elements(model, dimension, entities)
+    elements = _collect_elements(model, dimension, entities)
     if not elements:
         return np.empty((0, 1), dtype=np.int64)
     if list(elements) != [kind]:
         raise InputError(
-            f"{what} is not of the shapes of the cells' sides: mesh body and boundary together"
+            f"{group} is not of the shapes of the cells' sides: mesh body and boundary together"
         )
     all_nodes, _ = elements[kind]
     nodes = all_nodes[:, :vertices]
@@ -335,13 +342,13 @@ def _facets(
     rows = np.where(tags[place] == nodes, place, -1)
     unknown = rows < 0
     if unknown.any():
-        places = _coordinates(model, nodes[unknown], what)[:, : points.shape[1]]
-        rows[unknown] = _points_at(places, points)
-    kept, _ = _drop_repeats(rows)
-    return rows[kept]
+        places = _find_coordinates(model, nodes[unknown], group)[:, : points.shape[1]]
+        rows[unknown] = _find_points(places, points)
+    first_rows, _ = _drop_repeats(rows)
+    return rows[first_rows]
 
 
-def _points_at(places: Array, points: Array) -> Rows:
+def _find_points(places: Array, points: Array) -> Rows:
     """Return the one point at each place.
 
     It is -1 where there is none, or more than one, as where two bodies touch.
@@ -373,17 +380,20 @@ def add_arrays(gmsh: Any, arrays: MeshArrays) -> None:
     home = gmsh.model.addDiscreteEntity(d)  # holds the nodes
     gmsh.model.mesh.addNodes(d, home, 1 + np.arange(len(points)), points.reshape(-1))
     _add_groups(gmsh, d, cell, arrays.cells, arrays.cell_groups)
-    _add_groups(gmsh, d - 1, side, *_members(arrays.facet_groups))
+    _add_groups(gmsh, d - 1, side, *_join_groups(arrays.facet_groups))
 
 
-def _members(groups: dict[str, Rows]) -> tuple[Rows, dict[str, Mask]]:
+def _join_groups(groups: dict[str, Rows]) -> tuple[Rows, dict[str, Mask]]:
     """Return the rows of all groups, each once, and which of them are in each group."""
     if not groups:
         return np.zeros((0, 1), dtype=np.int64), {}
     numbers = number_alike(*groups.values())
     unique, first = np.unique(np.concatenate(numbers), return_index=True)
     rows = np.concatenate(list(groups.values()))[first]
-    return rows, {name: np.isin(unique, own) for name, own in zip(groups, numbers, strict=True)}
+    masks = {}
+    for name, numbers_of_group in zip(groups, numbers, strict=True):
+        masks[name] = np.isin(unique, numbers_of_group)
+    return rows, masks
 
 
 def _add_groups(gmsh: Any, dim: int, kind: int, rows: Rows, groups: dict[str, Mask]) -> None:
@@ -404,8 +414,8 @@ def _add_groups(gmsh: Any, dim: int, kind: int, rows: Rows, groups: dict[str, Ma
     entities = []
     for number in range(len(signatures)):
         entities.append(gmsh.model.addDiscreteEntity(dim))
-        own = rows[place.reshape(-1) == number]
-        gmsh.model.mesh.addElementsByType(entities[-1], kind, [], 1 + own.reshape(-1))
+        elements = rows[place.reshape(-1) == number]
+        gmsh.model.mesh.addElementsByType(entities[-1], kind, [], 1 + elements.reshape(-1))
     for column, name in enumerate(groups):
         members = np.array(entities)[signatures[:, column]].tolist()
         if members:

@@ -87,7 +87,7 @@ class GeoFile:
             Path(folder, "script.geo").write_text(script.text, encoding="utf-8")
             ended = self._run_gmsh(folder)
             if ended.returncode:
-                fault = _fault_of(ended).replace(PREFIX, "")
+                fault = _describe_fault(ended).replace(PREFIX, "")
                 raise InputError(f"{self.path}: Gmsh cannot mesh it: {fault}")
             for note in ended.stdout.splitlines():
                 log.warning("%s: %s", self.path, note)
@@ -117,7 +117,7 @@ class GeoFile:
             ) from None
 
 
-def _fault_of(ended: subprocess.CompletedProcess[str]) -> str:
+def _describe_fault(ended: subprocess.CompletedProcess[str]) -> str:
     """Return in words why the process that meshed did not succeed: the last line it printed."""
     lines = ended.stderr.strip().splitlines()
     if not lines:

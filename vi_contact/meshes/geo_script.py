@@ -95,13 +95,15 @@ def rewrite_script(path: Path, numbers: Mapping[str, float] | None = None) -> Sc
             lines, and a number that the script does not use or sets itself.
     """
     text = _read(path)
-    given = dict(numbers or {})
+    value_of_name = dict(numbers or {})
     tokens = _cut(text)
-    _refuse_numbers_without_effect(path, tokens, given)
-    own = (set(_SET.findall(text)) | set(given)) - WORDS
+    _refuse_numbers_without_effect(path, tokens, value_of_name)
+    own_names = (set(_SET.findall(text)) | set(value_of_name)) - WORDS
     statements, left_out = _leave_out(tokens)
-    written = "".join(_write(path, _drop_parameters(statements), own))
-    values = "".join(f"{PREFIX}{name} = {float(value)!r}; " for name, value in given.items())
+    written = "".join(_write(path, _drop_parameters(statements), own_names))
+    values = ""
+    for name, value in value_of_name.items():
+        values += f"{PREFIX}{name} = {float(value)!r}; "
     return Script(values + _GROUP.sub(_CHECKED, written) + "\n", tuple(left_out))
 
 
@@ -142,25 +144,25 @@ def _leave_out(tokens: Sequence[Token]) -> tuple[list[Token], list[tuple[int, st
 
     Each of these statements is told by its line and its beginning.
     """
-    kept: list[Token] = []
+    remaining: list[Token] = []
     left_out: list[tuple[int, str]] = []
     before = ""  # the last word that is no blank
     place = 0
     while place < len(tokens):
         token = tokens[place]
-        end = _end_of_unseen(tokens, place) if _can_begin(before) else place
+        end = _find_end_of_unseen(tokens, place) if _can_begin(before) else place
         if end == place:
-            kept.append(token)
+            remaining.append(token)
             if token.kind != "blank":
                 before = token.word
             place += 1
             continue
         # Line ends stay, so that what Gmsh says of a line is true of the user's script.
         statement = tokens[place:end]
-        kept += [token for token in statement if token.kind == "blank"]
-        left_out.append((token.line, _beginning(statement)))
+        remaining += [token for token in statement if token.kind == "blank"]
+        left_out.append((token.line, _name_statement(statement)))
         place = end
-    return kept, left_out
+    return remaining, left_out
 
 
 def _can_begin(before: str) -> bool:
@@ -168,7 +170,7 @@ def _can_begin(before: str) -> bool:
     return before in ("", ";", "}", ")", "EndIf", "EndFor", "Else")
 
 
-def _beginning(statement: Sequence[Token]) -> str:
+def _name_statement(statement: Sequence[Token]) -> str:
     """Return the words by which a user knows a statement that was left out."""
     words = [token.word for token in statement if token.kind != "blank"]
     if words[1:2] == ["."]:
@@ -176,7 +178,7 @@ def _beginning(statement: Sequence[Token]) -> str:
     return " ".join(words[:2]) if words[0] in ("Mesh", "Recursive") else words[0]
 
 
-def _end_of_unseen(tokens: Sequence[Token], start: int) -> int:
+def _find_end_of_unseen(tokens: Sequence[Token], start: int) -> int:
     """Return the place after the statement at ``start`` if it changes no mesh, else ``start``."""
     ahead = [token.word for token in tokens[start : start + 12] if token.kind != "blank"]
     first, second, third = [*ahead, "", "", ""][:3]
@@ -193,10 +195,10 @@ def _end_of_unseen(tokens: Sequence[Token], start: int) -> int:
     )
     if not unseen:
         return start
-    return _end_of_statement(tokens, start, braces=first in _UNSEEN_BRACES)
+    return _find_end(tokens, start, braces=first in _UNSEEN_BRACES)
 
 
-def _end_of_statement(tokens: Sequence[Token], start: int, *, braces: bool) -> int:
+def _find_end(tokens: Sequence[Token], start: int, *, braces: bool) -> int:
     """Return the place after the statement that begins at ``start``.
 
     Args:
@@ -215,13 +217,13 @@ def _end_of_statement(tokens: Sequence[Token], start: int, *, braces: bool) -> i
             return start  # what is no word of a script is refused, wherever it stands
         if token.kind != "sign":
             continue
-        level += _level_change(token.word)
+        level += _change_level(token.word)
         if level < 0:
             return start
         if level == 0 and token.word == ";":
             return place + 1
         if level == 0 and braces and token.word == "}":
-            after = _next_word(tokens, place + 1)
+            after = _find_next_word(tokens, place + 1)
             following = tokens[after].word if after < len(tokens) else ""
             if following == ";":
                 return after + 1
@@ -230,14 +232,14 @@ def _end_of_statement(tokens: Sequence[Token], start: int, *, braces: bool) -> i
     return start
 
 
-def _level_change(word: str) -> int:
+def _change_level(word: str) -> int:
     """Return how a sign changes the number of open brackets: 1, -1 or 0."""
     if word in ("(", "[", "{"):
         return 1
     return -1 if word in (")", "]", "}") else 0
 
 
-def _next_word(tokens: Sequence[Token], place: int) -> int:
+def _find_next_word(tokens: Sequence[Token], place: int) -> int:
     """Return the first place, from ``place`` on, of a token that is no blank."""
     while place < len(tokens) and tokens[place].kind == "blank":
         place += 1
@@ -250,7 +252,7 @@ def _drop_parameters(tokens: Sequence[Token]) -> list[Token]:
     DefineConstant[ h = {1, Name "size", Min 0} ] becomes DefineConstant[ h = 1 ]. What follows the
     value tells a window how to show it, and a text could name a file.
     """
-    kept: list[Token] = []
+    remaining: list[Token] = []
     place = 0
     inside = False  # the brackets of a DefineConstant
     level = 0
@@ -261,24 +263,24 @@ def _drop_parameters(tokens: Sequence[Token]) -> list[Token]:
             inside = True
             level = 0
         if inside:
-            level += _level_change(token.word)
+            level += _change_level(token.word)
             inside = level > 0
         if inside and before == "=" and token.word == "{":
-            value, after = _value_and_end(tokens, place)
+            value, after = _find_value_and_end(tokens, place)
             if value is not None:
-                kept += value
+                remaining += value
                 before = "}"
                 level -= 1  # the closing brace is dropped too
                 place = after
                 continue
-        kept.append(token)
+        remaining.append(token)
         if token.kind != "blank":
             before = token.word
         place += 1
-    return kept
+    return remaining
 
 
-def _value_and_end(tokens: Sequence[Token], start: int) -> tuple[list[Token] | None, int]:
+def _find_value_and_end(tokens: Sequence[Token], start: int) -> tuple[list[Token] | None, int]:
     """Return the tokens of the value in {value, parameters}, and the place after the closing brace.
 
     Line ends among the parameters stay. Braces without parameters hold a list of numbers: for them
@@ -292,7 +294,7 @@ def _value_and_end(tokens: Sequence[Token], start: int) -> tuple[list[Token] | N
         token = tokens[place]
         if token.kind == "blank":
             continue
-        level += _level_change(token.word)
+        level += _change_level(token.word)
         if level == 0:
             if not named:
                 return None, start
@@ -305,13 +307,13 @@ def _value_and_end(tokens: Sequence[Token], start: int) -> tuple[list[Token] | N
     return None, start
 
 
-def _write(path: Path, tokens: Sequence[Token], own: set[str]) -> Iterator[str]:
+def _write(path: Path, tokens: Sequence[Token], own_names: set[str]) -> Iterator[str]:
     """Yield the words that Gmsh gets, behind line ends where it needs them.
 
     Args:
         path: the script, for messages.
         tokens: what is left of it.
-        own: names that the script sets, which get a prefix.
+        own_names: names that the script sets, which get a prefix.
 
     Raises:
         InputError: words that are not allowed, all of them.
@@ -334,29 +336,29 @@ def _write(path: Path, tokens: Sequence[Token], own: set[str]) -> Iterator[str]:
             continue
         if skipping:
             skipping = word != ";"
-        elif not _fits(kind, word, words, own):
+        elif not _fits(kind, word, words, own_names):
             refused.append((token, _is_value(tokens, place, words)))
             skipping = word != ";"
         if ends:
             yield "\n"
-        is_own = word in own and words[-1] != "."
+        is_own = word in own_names and words[-1] != "."
         yield f" {PREFIX}{word}" if is_own else f" {word}"
         words.append(word)
-        level = 0 if word == "For" else level + _level_change(word)
+        level = 0 if word == "For" else level + _change_level(word)
         ends = word == "EndFor" or (begins and level == 0 and word in (")", "]", "}"))
         begins = (begins or word == "For") and not ends
     if refused:
-        raise InputError(f"{path}: {_sentence(refused)}")
+        raise InputError(f"{path}: {_write_sentence(refused)}")
 
 
-def _fits(kind: str, word: str, words: Sequence[str], own: set[str]) -> bool:
+def _fits(kind: str, word: str, words: Sequence[str], own_names: set[str]) -> bool:
     """Tell whether a token may stand behind these words.
 
     Args:
         kind: of the token.
         word: its text.
         words: what stands before it, three words or more.
-        own: names that the script sets.
+        own_names: names that the script sets.
     """
     if kind == "text":
         names_a_group = words[-1] == "(" and (words[-2] == "SetFactory" or words[-3] == "Physical")
@@ -368,7 +370,7 @@ def _fits(kind: str, word: str, words: Sequence[str], own: set[str]) -> bool:
         is_field_option = words[-2] == "]" and word in FIELD_OPTIONS
         return is_mesh_option or is_field_option
     if kind == "name":
-        return word in WORDS or word in own
+        return word in WORDS or word in own_names
     return kind == "sign" and (word != "." or words[-1] in ("Mesh", "]"))
 
 
@@ -379,7 +381,7 @@ def _is_value(tokens: Sequence[Token], place: int, words: Sequence[str]) -> bool
     """
     before = words[-1]
     is_field = list(words[-2:]) == ["]", "="] and "Field" in words[-6:]
-    next_place = _next_word(tokens, place + 1)
+    next_place = _find_next_word(tokens, place + 1)
     after = tokens[next_place].word if next_place < len(tokens) else ""
     return (
         tokens[place].kind == "name"
@@ -390,20 +392,20 @@ def _is_value(tokens: Sequence[Token], place: int, words: Sequence[str]) -> bool
     )
 
 
-def _sentence(refused: Sequence[tuple[Token, bool]]) -> str:
+def _write_sentence(refused: Sequence[tuple[Token, bool]]) -> str:
     """Return the sentence of all that is refused, with its lines, and the remedy of each kind."""
     values = dict.fromkeys(token.word for token, is_value in refused if is_value)
-    others = [token for token, is_value in refused if not is_value]
+    foreign = [token for token, is_value in refused if not is_value]
     parts = []
-    if others:
-        some = others[:MOST_PLACES]
-        places = ", ".join(f"line {token.line} has {shown(token.word)}" for token in some)
-        rest = len(others) - MOST_PLACES
-        more = f", and {rest} more" if rest > 0 else ""
-        them = "them" if len(others) > 1 else "it"
+    if foreign:
+        listed = foreign[:MOST_PLACES]
+        places = ", ".join(f"line {token.line} has {shown(token.word)}" for token in listed)
+        unlisted = len(foreign) - MOST_PLACES
+        ending = f", and {unlisted} more" if unlisted > 0 else ""
+        pronoun = "them" if len(foreign) > 1 else "it"
         parts.append(
-            f"{places}{more}, and only words of geometry, sizes, groups and arithmetic are meshed "
-            f"here: leave {them} out, or mesh the script yourself and give the .msh"
+            f"{places}{ending}, and only words of geometry, sizes, groups and arithmetic are "
+            f"meshed here: leave {pronoun} out, or mesh the script yourself and give the .msh"
         )
     if values:
         first = {token.word: token.line for token, is_value in reversed(refused) if is_value}
@@ -420,18 +422,18 @@ def _refuse_numbers_without_effect(
 ) -> None:
     """Raise InputError for a number that the script does not use, or sets whatever is given."""
     words = [token for token in tokens if token.kind != "blank"]
-    used = {token.word for token in words if token.kind == "name"}
+    names = {token.word for token in words if token.kind == "name"}
     define = 0  # level of brackets inside a DefineConstant
     set_at: dict[str, int] = {}
     for before, token, after in zip(words, words[1:], words[2:], strict=False):
         if define or before.word == "DefineConstant":
-            define += _level_change(token.word)
+            define += _change_level(token.word)
         elif token.kind == "name" and after.word in ("=", "In") and before.word != ".":
             set_at.setdefault(token.word, token.line)
     if len(words) > 1 and words[0].kind == "name" and words[1].word == "=":
         set_at.setdefault(words[0].word, words[0].line)
     for name in numbers:
-        if name not in used:
+        if name not in names:
             raise InputError(
                 f"{path}: numbers gives '{name}', which the script does not use: leave it out"
             )

@@ -77,11 +77,11 @@ def session(name: str = "vi_contact") -> Iterator[Any]:
 
 
 @contextmanager
-def options(gmsh: Any, wanted: Mapping[str, float]) -> Iterator[None]:
-    """Set Gmsh's options for the length of a with-block."""
-    before = {option: gmsh.option.getNumber(option) for option in wanted}
+def options(gmsh: Any, values: Mapping[str, float]) -> Iterator[None]:
+    """Set Gmsh's options to these values for the length of a with-block."""
+    before = {option: gmsh.option.getNumber(option) for option in values}
     try:
-        for option, value in wanted.items():
+        for option, value in values.items():
             gmsh.option.setNumber(option, value)
         yield
     finally:

@@ -57,8 +57,8 @@ class Grid:
         for axis, (low, high) in enumerate(self.sides):
             for name, end in ((low, 0), (high, -1)):
                 on_side = np.asarray(np.take(number, end, axis=axis))
-                faces[name] = _cells(on_side, self.simplices)
-        return points, _cells(number, self.simplices), faces
+                faces[name] = _divide(on_side, self.simplices)
+        return points, _divide(number, self.simplices), faces
 
 
 def add_grids(gmsh: Any, grids: Sequence[Grid]) -> None:
@@ -117,13 +117,20 @@ def add_outline(
 
 
 def _add_entity(model: Any, dim: int, name: str, boundary: Sequence[int] = ()) -> int:
-    """Add a discrete entity in a group of its own, and return its tag."""
+    """Add a discrete entity in a group of its own, and return its tag.
+
+    Args:
+        model: Gmsh's current model.
+        dim: dimension of the entity.
+        name: of the group.
+        boundary: tags of the entities that bound it.
+    """
     entity: int = model.addDiscreteEntity(dim, -1, list(boundary))
     model.setPhysicalName(dim, model.addPhysicalGroup(dim, [entity]), name)
     return entity
 
 
-def _cells(tags: npt.NDArray[np.int_], simplices: bool) -> npt.NDArray[np.int_]:
+def _divide(tags: npt.NDArray[np.int_], simplices: bool) -> npt.NDArray[np.int_]:
     """Return the vertices (n_cells, n_vertices) of every cell of a lattice of node tags.
 
     They are in Gmsh's order. A box of the lattice is one cell, or d! simplices.
@@ -163,6 +170,6 @@ def _kuhn_simplices(d: int) -> list[list[tuple[int, ...]]]:
         corners = np.vstack([np.zeros((1, d), int), steps.cumsum(axis=0)])
         walk = [tuple(corner) for corner in corners.tolist()]
         if d and np.linalg.det(steps) < 0.0:
-            walk[-1], walk[-2] = walk[-2], walk[-1]
+            walk[-1], walk[-2] = walk[-2], walk[-1]  # a left-handed one
         simplices.append(walk)
     return simplices

@@ -73,34 +73,35 @@ def _check_sections(data: mmap.mmap, file: Path) -> None:
         name = section[2]
         if closes:
             if name != is_open:
-                raise _damaged(file, name)
+                raise _describe_damage(file, name)
             is_open = b""
             continue
         if is_open:
-            raise _damaged(file, name)
+            raise _describe_damage(file, name)
         is_open = name
         ahead = data[section.end() : section.end() + SHORT]
         packed = binary == b"1" and name != b"PhysicalNames"
-        counts = _packed_counts(ahead) if packed else _written_counts(ahead)
+        counts = _unpack_counts(ahead) if packed else _read_counts(ahead)
         if version.startswith(b"2"):
             counts = counts[:1]
         if max(counts) > len(data):
-            what = name.decode().lower()
+            items = name.decode().lower()
             raise InputError(
-                f"mesh file {file} announces more {what} than it can hold: write it again from Gmsh"
+                f"mesh file {file} announces more {items} than it can hold: write it again "
+                "from Gmsh"
             )
     if is_open:
-        raise _damaged(file, name)
+        raise _describe_damage(file, name)
 
 
-def _damaged(file: Path, name: bytes) -> InputError:
+def _describe_damage(file: Path, name: bytes) -> InputError:
     """Return the error of a file whose sections do not follow one another."""
     return InputError(
         f"mesh file {file} is cut short or damaged near {name.decode()}: write it again from Gmsh"
     )
 
 
-def _written_counts(ahead: bytes) -> tuple[int, ...]:
+def _read_counts(ahead: bytes) -> tuple[int, ...]:
     """Return the first two numbers after a section's name, 0 for what is none.
 
     They are blocks and items in format 4, items and more in format 2.
@@ -109,7 +110,7 @@ def _written_counts(ahead: bytes) -> tuple[int, ...]:
     return tuple(int(word) if word.isdigit() else 0 for word in words) or (0,)
 
 
-def _packed_counts(ahead: bytes) -> tuple[int, ...]:
+def _unpack_counts(ahead: bytes) -> tuple[int, ...]:
     """Return these numbers of a binary file.
 
     They have 8 bytes each. Of both orders of bytes, and of written numbers where there is a digit,
@@ -120,5 +121,5 @@ def _packed_counts(ahead: bytes) -> tuple[int, ...]:
     if len(head) == 16:
         readings = [struct.unpack("<2Q", head), struct.unpack(">2Q", head)]
     if ahead[1:2].isdigit():
-        readings.append(_written_counts(ahead))
+        readings.append(_read_counts(ahead))
     return min(readings, key=max, default=(0,))

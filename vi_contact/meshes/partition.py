@@ -21,7 +21,13 @@ def halve(centres: Array, n: int) -> Ranks:
     owner = np.zeros(len(centres), dtype=np.int32)
 
     def split(rows: npt.NDArray[np.intp], first: int, count: int) -> None:
-        """Give these points to as many owners, from the first one on."""
+        """Give these points to as many owners, from the first one on.
+
+        Args:
+            rows: numbers of the points.
+            first: number of the first owner.
+            count: number of owners.
+        """
         owner[rows] = first
         if count == 1 or not len(rows):
             return

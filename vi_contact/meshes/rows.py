@@ -92,23 +92,23 @@ def number_alike(*tables: Rows) -> list[Rows]:
     return np.split(numbers.astype(np.int64), ends[:-1])
 
 
-def found_in(numbers: Rows, among: Rows) -> Mask:
-    """Tell which of the numbers (>= 0) occur among the others."""
+def are_among(numbers: Rows, among: Rows) -> Mask:
+    """Tell which of the numbers (>= 0) occur ``among`` the others."""
     known = np.zeros(max(numbers.max(initial=0), among.max(initial=0)) + 1, dtype=bool)
     known[among] = True
     return known[numbers]
 
 
-def connected(count: int, one: Rows, other: Rows) -> Rows:
+def number_parts(count: int, first: Rows, second: Rows) -> Rows:
     """Return the number of the connected part of each of so many things.
 
     Args:
         count: number of things.
-        one: things that are linked with those of ``other``.
-        other: the same number of things.
+        first: things that are linked with those of ``second``.
+        second: the same number of things.
     """
     from scipy.sparse.csgraph import connected_components  # late: it takes a while
 
-    graph = coo_matrix((np.ones(len(one)), (one, other)), shape=(count, count))
+    graph = coo_matrix((np.ones(len(first)), (first, second)), shape=(count, count))
     _, part = connected_components(graph, directed=False)
     return np.asarray(part, dtype=np.int64)

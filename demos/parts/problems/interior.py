@@ -21,7 +21,7 @@ from vi_contact.bem.fundamental_solution import TimeKernels
 from vi_contact.bem.loops import distances
 from vi_contact.bem.poincare_steklov import BoundaryMotion, PoincareSteklov
 from vi_contact.bem.quadrature import integration_matrix
-from vi_contact.bem.rules import pieces, place_rule, roots, smoothed_rule
+from vi_contact.bem.rules import pieces, place_rule, roots, smooth_rule
 from vi_contact.core.algebra import Array
 from vi_contact.core.checks import array, instance, integers, shape_of
 from vi_contact.core.errors import InputError
@@ -113,9 +113,7 @@ def _moments(mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float) -> 
         row, low, length = pieces(np.concatenate([*fronts, foot[:, None]], axis=1))
         eta, weight = (
             part.ravel()
-            for part in place_rule(
-                low, length, smoothed_rule(ORDER), about=(foot[row], height[row])
-            )
+            for part in place_rule(low, length, smooth_rule(ORDER), about=(foot[row], height[row]))
         )
         owner = np.repeat(row, ORDER)
         weight = weight * np.sqrt(b2)[owner]

@@ -19,7 +19,7 @@ import numpy as np
 from ...core.algebra import Array, Indices
 from ...core.checks import at
 from ...core.errors import InputError
-from ...meshes.rows import connected
+from ...meshes.rows import number_parts
 from ..mesh.group_checks import components_given, components_of, facets_of
 from ..mesh.tagged_mesh import Facets
 
@@ -100,7 +100,7 @@ def link(
     first, second = (np.concatenate(side) for side in zip(*pairs, strict=True))
     # what hangs together through ties is one part, and moves as one
     members, index = np.unique(np.concatenate([first, second]), return_inverse=True)
-    part = connected(len(members), *index.ravel().reshape(2, -1))
+    part = number_parts(len(members), *index.ravel().reshape(2, -1))
     order = np.lexsort((members, np.isin(members, second), part))  # of every part the leader first
     _, start = np.unique(part[order], return_index=True)
     leaders = members[order[start]][part]

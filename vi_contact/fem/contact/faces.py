@@ -18,7 +18,7 @@ import ufl
 from ...core.algebra import Array, Indices, Mask, from_each
 from ...core.checks import at, number
 from ...core.errors import InputError
-from ...meshes.rows import connected, number_alike
+from ...meshes.rows import number_alike, number_parts
 from .. import compat
 from ..body.space import FemSpace
 from ..mesh.numbering import facet_rows, is_curved
@@ -68,13 +68,13 @@ class Boundary:
             close = _turn(normals[first], normals[second]) <= angle * (1.0 + 1e-9)
             links.append(np.stack([first[close], second[close]]))
         pairs = np.concatenate([np.zeros((2, 0), dtype=np.int64), *links], axis=1)
-        return connected(len(node), *pairs).reshape(self.vertices.shape)
+        return number_parts(len(node), *pairs).reshape(self.vertices.shape)
 
     def faces(self, angle: float) -> Indices:
         """Return the number (k,) of the face of each facet over the whole boundary."""
         k, v = self.vertices.shape
         of_facet = np.repeat(np.arange(k), v), k + self.corner_faces(angle).ravel()
-        return np.unique(connected(k + k * v, *of_facet)[:k], return_inverse=True)[1].ravel()
+        return np.unique(number_parts(k + k * v, *of_facet)[:k], return_inverse=True)[1].ravel()
 
 
 def checked_angle(owner: str, value: Any) -> float:

@@ -17,7 +17,7 @@ from ...core.algebra import Array, Indices, Mask
 from ...core.checks import at
 from ...core.errors import InputError
 from ...core.surfaces import nodal_frames
-from ...meshes.rows import connected
+from ...meshes.rows import number_parts
 from .clipping import areas, cross, overlaps, stacked, turns, without
 from .matching import DISTANCES, EDGE_ON, Side
 from .nodes import Nodes, Rows
@@ -330,7 +330,7 @@ def layers(pieces: Pieces, theirs: Facets, count: int) -> Indices:
     nodes = pieces.look[:, None] * (int(theirs.nodes.max()) + 1) + theirs.nodes[pieces.facet]
     nodes = np.unique(nodes, return_inverse=True)[1].reshape(nodes.shape)
     links = np.repeat(np.arange(len(nodes)), nodes.shape[1]), len(nodes) + nodes.ravel()
-    part = connected(len(nodes) + nodes.size, *links)[: len(nodes)]
+    part = number_parts(len(nodes) + nodes.size, *links)[: len(nodes)]
     return np.bincount(pieces.look[np.unique(part, return_index=True)[1]], minlength=count)
 
 

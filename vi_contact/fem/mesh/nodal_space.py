@@ -10,7 +10,7 @@ import numpy as np
 from ...core.algebra import Algebra, Array, Comm, Indices, Mask, from_each, largest
 from ...core.checks import at
 from ...core.errors import InputError
-from ...meshes.rows import connected
+from ...meshes.rows import number_parts
 
 MEANT = (
     0.05  # of the size of a body: how far from it a point may be that stands for the nearest node
@@ -173,7 +173,7 @@ def _smallest(first: Any, second: Any, numbers: Indices) -> Indices:
         second: places of the other ends.
         numbers: (n,) of the things.
     """
-    part = connected(len(numbers), first, second)
+    part = number_parts(len(numbers), first, second)
     smallest = np.full(part.max(initial=-1) + 1, np.iinfo(np.int64).max)
     np.minimum.at(smallest, part, numbers)
     return smallest[part]

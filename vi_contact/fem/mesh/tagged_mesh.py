@@ -24,7 +24,7 @@ from ...core.timing import report_time
 from ...meshes.extract import MeshArrays, arrays_from_file, arrays_from_script
 from ...meshes.gmsh_session import MeshScript
 from ...meshes.partition import destinations
-from ...meshes.rows import found_in, number_alike
+from ...meshes.rows import are_among, number_alike
 from .. import compat
 from ..compat import Indices
 from .communicators import MpiComm
@@ -271,5 +271,5 @@ def _distribute(comm: MPI.Comm, produce: Callable[[], MeshArrays]) -> tuple[Mesh
     )
     facets, *named = number_alike(node_numbers(mesh)[everyone], *arrays.facet_groups.values())
     for name, numbers in zip(arrays.facet_groups, named, strict=True):
-        tags[name] = Facets(name, np.flatnonzero(found_in(facets, numbers)).astype(np.int32), mesh)
+        tags[name] = Facets(name, np.flatnonzero(are_among(facets, numbers)).astype(np.int32), mesh)
     return mesh, tags

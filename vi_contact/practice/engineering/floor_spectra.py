@@ -34,38 +34,53 @@ def recorded_motion(history: Mapping[str, Array], column: str, *, relative: bool
     before t; spectra and ratios of columns of the same kind do not see that, and a_g_<axis> is
     brought to the same instants. A column v_<axis>_<label> of ``Probe(..., velocity=True)`` gives
     the same from differences of velocities, with the jumps that an impact law makes: they are not
-    in a_<axis>_<label>, whose integral drifts off. ``relative``: minus the ground acceleration
-    a_g_<axis> of the run. InputError for columns that are no accelerations.
+    in a_<axis>_<label>, whose integral drifts off.
+
+    Args:
+        history: column -> values (rows,) of a run.
+        column: a_<axis>_<label>, v_<axis>_<label>, or a_g_<axis> for the ground.
+        relative: whether the ground acceleration a_g_<axis> of the run is subtracted.
+
+    Raises:
+        InputError: a column that is no acceleration, that the history does not have, or of fewer
+            than three rows.
     """
     flag("recorded_motion", "relative", relative)
     instance(
         "recorded_motion", "column", column, str, "give the name of a column, such as 'a_x_top'"
     )
-    kind, _, rest = column.partition("_")
-    axis = rest.partition("_")[2 if rest.startswith("g_") else 0]
-    if kind not in ("a", "v") or "_" not in rest:
+    kind, _, place = column.partition("_")  # place: x_<label>, or g_x for the ground
+    first, _, second = place.partition("_")
+    axis = second if first == "g" else first
+    if kind not in ("a", "v") or "_" not in place:
         raise InputError(
             f"column '{column}' is not an acceleration: record Probe(..., acceleration=True) "
             "and give a_x_<label>, or give a_g_x for the ground"
         )
-    values, t = column_of(history, column), column_of(history, "t")
+    values = column_of(history, column)
+    t = column_of(history, "t")
     if len(t) < 3:
         raise InputError(f"the history has {len(t)} rows: give one of three or more")
+
+    # The ground's acceleration as the mean over each step, as probes have theirs.
     ground = np.asarray(history.get(f"a_g_{axis}", np.zeros(len(t))), dtype=float)
-    # mean over the step, as probes have it
     ground = np.append(ground[:1], 0.5 * (ground[1:] + ground[:-1]))
     if kind == "v":
         values = np.append(0.0, np.diff(values) / np.diff(t)) + ground
     elif column == f"a_g_{axis}":
         values = ground
-    values = values - ground if relative else values
+    if relative:
+        values = values - ground
+
+    # Even steps for the record.
     steps = np.diff(t)
     dt = float(np.median(steps))
     if np.ptp(steps) > 1e-6 * dt:
-        asked = (t[-1] - t[0]) / dt * (1.0 + 1e-12)
-        counted(f"column '{column}'", f"the step of {dt:g} s in {t[-1] - t[0]:g} s", asked)
-        even = t[0] + dt * np.arange(int(np.floor(asked)) + 1)
-        values = np.interp(even, t, values)
+        number_of_steps = (t[-1] - t[0]) / dt * (1.0 + 1e-12)
+        step_in_words = f"the step of {dt:g} s in {t[-1] - t[0]:g} s"
+        counted(f"column '{column}'", step_in_words, number_of_steps)
+        even_times = t[0] + dt * np.arange(int(np.floor(number_of_steps)) + 1)
+        values = np.interp(even_times, t, values)
     frame = "relative" if relative else "absolute"
     return Record(
         values,
@@ -84,9 +99,17 @@ def floor_spectrum(
     damping: float = 0.05,
     relative: bool = False,
 ) -> ResponseSpectrum:
-    """Return the response spectrum of an oscillator of each period [s].
+    """Return the response spectrum of oscillators that stand where the column was recorded.
 
-    The oscillator stands where the column was recorded.
+    Args:
+        history: column -> values (rows,) of a run.
+        column: as for ``recorded_motion``.
+        periods: (m,) of the oscillators [s].
+        damping: their ratio.
+        relative: whether the ground's acceleration is subtracted.
+
+    Raises:
+        InputError: as for ``recorded_motion`` and ``response_spectrum``.
     """
     return response_spectrum(
         recorded_motion(history, column, relative=relative), periods, damping=damping
@@ -119,48 +142,61 @@ def transfer_function(
     bandwidth: float | None = BANDWIDTH,
     floor: float = 1e-3,
 ) -> TransferFunction:
-    """Return |A_surface(f)| / |A_base(f)| of absolute accelerations.
-
-    It comes from the Fourier amplitudes of two columns.
+    """Return |A_surface(f)| / |A_base(f)|, from the Fourier amplitudes of absolute accelerations.
 
     Amplitudes are smoothed alike with Konno and Ohmachi's window (1998), which widens peaks, before
-    they are divided; ``bandwidth=None`` takes the raw ones. The motion has to die away before the
-    run ends, or be periodic, else its end leaks into all frequencies. ``frequencies`` None: 200,
-    from four periods in the run to four samples in a period; raw all of the transform. nan where
-    the base has below ``floor`` of its peak. InputError for a base without motion.
+    they are divided. The motion has to die away before the run ends, or be periodic, else its end
+    leaks into all frequencies.
+
+    Args:
+        history: column -> values (rows,) of a run.
+        surface: column of the motion that is divided, as for ``recorded_motion``.
+        base: column of the motion that divides.
+        frequencies: (m,) [Hz]; None: 200, from four periods in the run to four samples in a period,
+            or all those of the transform where amplitudes are raw.
+        bandwidth: of the window; None: amplitudes stay raw.
+        floor: share of the base's peak amplitude below which the ratio is nan.
+
+    Raises:
+        InputError: a base without motion, frequencies that the run does not resolve, and as for
+            ``recorded_motion``.
     """
     number("transfer_function", "floor", floor, positive=True)
     optional(number, "transfer_function", "bandwidth", bandwidth, positive=True)
-    top, below = recorded_motion(history, surface), recorded_motion(history, base)
+    top = recorded_motion(history, surface)
+    below = recorded_motion(history, base)
+
+    # Fourier amplitudes at all frequencies of the transform but zero.
     raw = np.fft.rfftfreq(len(top.acceleration), top.dt)[1:]
-    spectra = [np.abs(np.fft.rfft(one.acceleration))[1:] for one in (top, below)]
-    if frequencies is None:
-        wanted = raw if bandwidth is None else np.geomspace(4.0 * raw[0], 0.5 * raw[-1], 200)
+    top_amplitudes = np.abs(np.fft.rfft(top.acceleration))[1:]
+    base_amplitudes = np.abs(np.fft.rfft(below.acceleration))[1:]
+    if frequencies is not None:
+        row = np.atleast_1d(np.asarray(frequencies))
+        centres = array("transfer_function", "frequencies", row, (None,), unit="Hz")
+    elif bandwidth is None:
+        centres = raw
     else:
-        wanted = array(
-            "transfer_function",
-            "frequencies",
-            np.atleast_1d(np.asarray(frequencies)),
-            (None,),
-            unit="Hz",
-        )
-    if np.any(wanted <= 0.0) or np.any(wanted > raw[-1] * (1.0 + 1e-9)):
+        centres = np.geomspace(4.0 * raw[0], 0.5 * raw[-1], 200)
+    if np.any(centres <= 0.0) or np.any(centres > raw[-1] * (1.0 + 1e-9)):
         raise InputError(
             f"transfer_function: give frequencies above 0 and up to {raw[-1]:.4g} Hz, half the "
             "sampling"
         )
-    if bandwidth is None:
-        smooth = [np.interp(wanted, raw, one) for one in spectra]
-    else:
-        smooth = [konno_ohmachi(raw, one, wanted, bandwidth=bandwidth) for one in spectra]
-    largest = float(spectra[1].max())
-    if not largest > 0.0:
+    if not float(base_amplitudes.max()) > 0.0:
         raise InputError(
             f"transfer_function: column '{base}' is zero throughout: name the motion at the base"
         )
-    ratio = np.full(len(wanted), np.nan)
-    np.divide(smooth[0], smooth[1], out=ratio, where=smooth[1] > floor * smooth[1].max())
-    return TransferFunction(wanted, ratio)
+
+    # Smooth both, then divide where the base moves enough.
+    if bandwidth is None:
+        numerator = np.interp(centres, raw, top_amplitudes)
+        denominator = np.interp(centres, raw, base_amplitudes)
+    else:
+        numerator = konno_ohmachi(raw, top_amplitudes, centres, bandwidth=bandwidth)
+        denominator = konno_ohmachi(raw, base_amplitudes, centres, bandwidth=bandwidth)
+    ratio = np.full(len(centres), np.nan)
+    np.divide(numerator, denominator, out=ratio, where=denominator > floor * denominator.max())
+    return TransferFunction(centres, ratio)
 
 
 def konno_ohmachi(
@@ -169,6 +205,15 @@ def konno_ohmachi(
     """Smooth amplitudes at the centres with Konno and Ohmachi's weights.
 
     The weights are (sin x / x)⁴, x = b log10(f / f_c) (Konno, Ohmachi 1998).
+
+    Args:
+        frequencies: (n,), f [Hz].
+        amplitudes: (n,), at these.
+        centres: (m,), f_c [Hz].
+        bandwidth: b.
+
+    Returns:
+        The smooth amplitudes (m,).
     """
     smooth = np.empty(len(centres))
     for k, centre in enumerate(centres):

@@ -40,34 +40,41 @@ class Peak:
 def peaks(
     history: Mapping[str, Array], columns: Columns, names: Sequence[str] | None = None
 ) -> list[Peak]:
-    """Return the peaks of these columns, of all columns of numbers but the counters when None.
-
-    nan values are left out.
+    """Return the largest and smallest values of columns; nan values are left out.
 
     The peak of an acceleration is that of the time step where contact closes, and is marked so: it
-    grows as dt falls, while displacements and forces converge. InputError for a column that the
-    history does not have, or one of arrays.
+    grows as dt falls, while displacements and forces converge.
+
+    Args:
+        history: column -> values (rows,) of a run.
+        columns: column -> (unit, meaning).
+        names: of the columns; None: all columns of numbers but the counters.
+
+    Raises:
+        InputError: a column that the history does not have, or one of arrays.
     """
-    for kind, one in (("history", history), ("columns", columns)):
-        instance("peaks", kind, one, Mapping, f"give the {kind} of a solution")
+    for kind, mapping in (("history", history), ("columns", columns)):
+        instance("peaks", kind, mapping, Mapping, f"give the {kind} of a solution")
     if names is None:
         names = [
             name
             for name in columns
             if name not in _NOT_PEAKS and name in history and history[name].ndim == 1
         ]
-    found = []
+    rows = []
     for name in several("peaks", "names", names, "give a list of columns, or None"):
-        values, t = column_of(history, name), history["t"]
+        values = column_of(history, name)
+        t = history["t"]
         unit, quantity = columns[name]
         if name.startswith(("a_x_", "a_y_", "a_z_")):
             quantity += GROWS
         numbers = [float("nan")] * 4
         if not np.isnan(values).all():
-            high, low = int(np.nanargmax(values)), int(np.nanargmin(values))
+            high = int(np.nanargmax(values))
+            low = int(np.nanargmin(values))
             numbers = [float(x) for x in (values[high], t[high], values[low], t[low])]
-        found.append(Peak(name, quantity, unit, *numbers))
-    return found
+        rows.append(Peak(name, quantity, unit, *numbers))
+    return rows
 
 
 @checked
@@ -99,7 +106,8 @@ class Loop:
 
         It is nan where nothing moved.
         """
-        high, low = int(np.argmax(self.deformation)), int(np.argmin(self.deformation))
+        high = int(np.argmax(self.deformation))
+        low = int(np.argmin(self.deformation))
         way = self.deformation[high] - self.deformation[low]
         return float((self.force[high] - self.force[low]) / way) if way > 0.0 else float("nan")
 
@@ -111,11 +119,21 @@ def hysteresis(
 
     Such are base shear over top displacement, shear over racking, or M over theta.
 
-    ``sign`` = -1 turns the force: reactions on the body push against its deformation. InputError
-    for missing columns.
+    Args:
+        history: column -> values (rows,) of a run.
+        deformation: column of x.
+        force: column of F.
+        sign: factor of the force; -1 for reactions on the body, which push against its
+            deformation.
+
+    Raises:
+        InputError: a column that the history does not have, or one of arrays.
     """
     number("hysteresis", "sign", sign)
-    x, y = column_of(history, deformation), sign * column_of(history, force)
+    x = column_of(history, deformation)
+    y = sign * column_of(history, force)
+
+    # Work by the trapezoidal rule.
     work = np.concatenate([[0.0], np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(x))])
     return Loop(x, y, work)
 
@@ -125,7 +143,7 @@ def column_of(history: Mapping[str, Array], name: str) -> Array:
     instance("history", "the name of a column", name, str, "give a text, such as 'u_x_top'")
     instance("history", "it", history, Mapping, "give the history of a solution")
     if name not in history:
-        known = [one for one in history if np.ndim(history[one]) == 1]
+        known = [column for column in history if np.ndim(history[column]) == 1]
         raise InputError(f"the history has no column '{name}': it has {', '.join(known)}")
     values = np.asarray(history[name], dtype=float)
     if values.ndim != 1:

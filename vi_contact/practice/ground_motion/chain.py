@@ -65,10 +65,10 @@ class Processing:
 
     def __post_init__(self) -> None:
         scalings = ("scale", "pga", "arias", "psa")
-        asked = [name for name in scalings if getattr(self, name) is not None]
-        if len(asked) > 1:
+        chosen = [name for name in scalings if getattr(self, name) is not None]
+        if len(chosen) > 1:
             raise InputError(
-                f"Processing: {' and '.join(asked)} were both given; scale a record only once"
+                f"Processing: {' and '.join(chosen)} were both given; scale a record only once"
             )
 
     def __call__(self, record: Record) -> Record:

@@ -132,10 +132,10 @@ def padded(record: Record, before: float = 0.0, after: float = 0.0) -> Record:
         raise InputError(
             f"padded: before={before!r} and after={after!r} s; give zero or positive lengths"
         )
-    asked = [length / record.dt * (1.0 - 1e-9) for length in (before, after)]
-    total = record.acceleration.size + sum(asked)
+    steps = [length / record.dt * (1.0 - 1e-9) for length in (before, after)]
+    total = record.acceleration.size + sum(steps)
     counted("padded", f"before={before!r} and after={after!r} s", total)
-    counts = [math.ceil(samples) for samples in asked]
+    counts = [math.ceil(number) for number in steps]
     note = f"zeros added: {counts[0] * record.dt:g} s before, {counts[1] * record.dt:g} s after"
     return record.changed(np.pad(record.acceleration, counts), note)
 
@@ -277,16 +277,16 @@ def baseline_corrected(record: Record, *, degree: int = 2, displacement: bool = 
     # One polynomial that brings both to rest at the end.
     scale = np.array([[record.duration], [record.duration**2]])
     ends = np.array([velocities[:, -1], displacements[:, -1]]) / scale
-    wanted = np.array([[velocity_of_record[-1]], [displacement_of_record[-1]]]) / scale
-    at_rest, *_ = np.linalg.lstsq(ends, wanted, rcond=None)
+    drift = np.array([[velocity_of_record[-1]], [displacement_of_record[-1]]]) / scale
+    at_rest, *_ = np.linalg.lstsq(ends, drift, rcond=None)
     coefficients = at_rest[:, 0]
 
     # The best of those that change nothing at the end, added to it.
     _, _, rows = np.linalg.svd(ends)
     free = rows[2:].T
     if free.shape[1]:
-        rest, *_ = np.linalg.lstsq(basis @ free, target - basis @ coefficients, rcond=None)
-        coefficients = coefficients + free @ rest
+        shares, *_ = np.linalg.lstsq(basis @ free, target - basis @ coefficients, rcond=None)
+        coefficients = coefficients + free @ shares
     kind = "displacement" if displacement else "velocity"
     note = f"baseline: polynomial of degree {degree} fitted to the {kind}, v = u = 0 at the end"
     return record.changed(record.acceleration - powers @ coefficients, note)

@@ -130,7 +130,7 @@ _SPELLINGS = {
 """Other spellings of units, after blanks, dots, powers and "sec" have been unified."""
 
 
-def known_units(units: str) -> str | None:
+def recognise_units(units: str) -> str | None:
     """Return the key of UNITS that `units` spells ("CM/SEC/SEC", "(g)", "cm/s^2"), or None."""
     text = units.lower().strip(" ()[].,;:'\"")
     text = text.replace("²", "2")
@@ -148,7 +148,7 @@ def canonical_units(source: str, units: str) -> str:
 
     Raises InputError, which names the source, where there is none.
     """
-    text = known_units(units) if isinstance(units, str) else None
+    text = recognise_units(units) if isinstance(units, str) else None
     if text is None:
         raise InputError(
             f"{source}: {units!r} is not a unit of acceleration known here; use a file of "

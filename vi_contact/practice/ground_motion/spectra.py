@@ -62,7 +62,9 @@ class ResponseSpectrum:
         return (2.0 * math.pi / self.periods) ** 2 * self.displacement
 
 
-def _factors(time: Array | float, length: Array | float, omega: Array, zeta: float) -> Array:
+def _compute_factors(
+    time: Array | float, length: Array | float, omega: Array, zeta: float
+) -> Array:
     """Return what u, v, a0 and a1 add to displacement and velocity after a time, (4, 2, m).
 
     The acceleration goes from a0 to a1; the oscillator vibrates about -(a0 + s t)/omega² + 2 zeta
@@ -92,17 +94,25 @@ def _factors(time: Array | float, length: Array | float, omega: Array, zeta: flo
     of_one = constant - of_u * constant[0] - of_v * constant[1]
     of_ramp = ramp - of_u * ramp0[0] - of_v * ramp0[1]
     small = omega * time < _SMALL
-    of_one = np.where(small, _series(time, omega, zeta, 2), of_one)
-    of_slope = np.where(small, _series(time, omega, zeta, 3), of_ramp) / length
+    of_one = np.where(small, _sum_series(time, omega, zeta, 2), of_one)
+    of_slope = np.where(small, _sum_series(time, omega, zeta, 3), of_ramp) / length
     return np.array([of_u, of_v, of_one - of_slope, of_slope])
 
 
 def _move(factors: Array, u: Array, v: Array, a0: Array | float, a1: Array | float) -> Array:
-    """Return (displacement, velocity), shape (2, ..., m), from ``_factors``."""
+    """Return (displacement, velocity), shape (2, ..., m), from ``_compute_factors``.
+
+    Args:
+        factors: (4, 2, m), or of a shape that fits.
+        u: displacements at the start [m].
+        v: velocities at the start [m/s].
+        a0: acceleration of the ground at the start of the step [m/s²].
+        a1: acceleration of the ground at its end [m/s²].
+    """
     return factors[0] * u + factors[1] * v + factors[2] * a0 + factors[3] * a1
 
 
-def _series(time: Array | float, omega: Array, zeta: float, first: int) -> Array:
+def _sum_series(time: Array | float, omega: Array, zeta: float, first: int) -> Array:
     """Return the motion (2, m) under a = 1 (first = 2) or a = t (first = 3) from rest.
 
     It is a power series: u = sum c_k t^k with c_first = -1/first! and k (k-1) c_k = -2 zeta omega
@@ -162,12 +172,12 @@ def response_spectrum(record: Record, periods: Array, *, damping: float = 0.05) 
     counted("response_spectrum", f"{row.size} periods", numbers, most=MOST)
 
     # Oscillators that need the same number of looks a step go together.
-    wanted = 2 ** np.ceil(np.log2(PER_PERIOD * record.dt / row))
-    parts = np.maximum(PER_STEP, wanted).astype(int)
+    least_parts = 2 ** np.ceil(np.log2(PER_PERIOD * record.dt / row))
+    parts = np.maximum(PER_STEP, least_parts).astype(int)
     peaks = np.zeros((3, row.size))
     for count in np.unique(parts):
-        same = parts == count
-        peaks[:, same] = _peaks(record, 2.0 * math.pi / row[same], damping, int(count))
+        group = parts == count
+        peaks[:, group] = _find_peaks(record, 2.0 * math.pi / row[group], damping, int(count))
     return ResponseSpectrum(row, damping, *peaks)
 
 
@@ -183,7 +193,7 @@ def fourier_spectrum(record: Record) -> tuple[Array, Array]:
     return np.fft.rfftfreq(record.acceleration.size, record.dt), amplitudes
 
 
-def _peaks(record: Record, omega: Array, zeta: float, parts: int) -> Array:
+def _find_peaks(record: Record, omega: Array, zeta: float, parts: int) -> Array:
     """Return the largest |u|, |v| and |u'' + a|, (3, m).
 
     Args:
@@ -193,7 +203,7 @@ def _peaks(record: Record, omega: Array, zeta: float, parts: int) -> Array:
         parts: how often a step is looked at.
     """
     dt = record.dt
-    looks = [_factors(dt * part / parts, dt, omega, zeta) for part in range(1, parts + 1)]
+    looks = [_compute_factors(dt * part / parts, dt, omega, zeta) for part in range(1, parts + 1)]
     peaks = np.zeros((3, omega.size))
     x = np.zeros((2, omega.size))  # displacement and velocity at the start of a step
 
@@ -206,17 +216,17 @@ def _peaks(record: Record, omega: Array, zeta: float, parts: int) -> Array:
             x = _move(looks[-1], x[0], x[1], a[k], a[k + 1])
         for look in looks:
             between = _move(look[:, :, None, :], states[0], states[1], a[:-1, None], a[1:, None])
-            peaks = np.maximum(peaks, _sizes(between, omega, zeta).max(axis=1))
+            peaks = np.maximum(peaks, _measure(between, omega, zeta).max(axis=1))
 
     # Free vibration behind the record: its first period holds its peaks.
     period = 2.0 * math.pi / omega
     for part in range(1, PER_PERIOD + 1):
-        look = _factors(period * part / PER_PERIOD, period, omega, zeta)
+        look = _compute_factors(period * part / PER_PERIOD, period, omega, zeta)
         free = _move(look, x[0], x[1], 0.0, 0.0)
-        peaks = np.maximum(peaks, _sizes(free, omega, zeta))
+        peaks = np.maximum(peaks, _measure(free, omega, zeta))
     return peaks
 
 
-def _sizes(x: Array, omega: Array, zeta: float) -> Array:
+def _measure(x: Array, omega: Array, zeta: float) -> Array:
     """Return |u|, |v| and |u'' + a| = |2 zeta omega v + omega² u|, shape (3, ..., m)."""
     return np.abs(np.array([x[0], x[1], 2.0 * zeta * omega * x[1] + omega**2 * x[0]]))

@@ -20,7 +20,7 @@ from ...core.checks import array
 from ...core.errors import InputError, of_machine
 from ...core.files import FIELDS, frames_of, open_hdf5
 from ...core.own_files import inner_folder
-from ...meshes.rows import SIDES, connected
+from ...meshes.rows import SIDES, number_parts
 from ...run.files.reading import RunFolder, read_run
 from ...run.recorders.contact_parts import Geometry, tangent_vectors
 
@@ -79,7 +79,7 @@ class StoredFrames:
         count, corners = self.cells.shape
         cells = np.repeat(np.arange(count), corners)
         nodes = count + self.cells.ravel()
-        return connected(count + len(self.points), cells, nodes)[:count]
+        return number_parts(count + len(self.points), cells, nodes)[:count]
 
     @cached_property
     def boundary(self) -> tuple[Indices, Indices]:

@@ -14,7 +14,7 @@ from ...core.corners import FEATURE_ANGLE
 from ...core.errors import InputError
 from ...core.files import frames_of
 from ...core.step import AXES
-from ...meshes.rows import connected
+from ...meshes.rows import number_parts
 from ...run.files.reading import RunFolder
 from ...run.recorders.contact_parts import Geometry, tangent_vectors
 from .deformed import (
@@ -75,11 +75,11 @@ def split_faces(contact: Geometry, sides: Indices) -> list[Face]:
     m = len(points)
     size = float(np.ptp(points, axis=0).max()) or 1.0
 
-    # Pieces: points that are connected by neighbours which point the same way.
+    # Pieces: points that are number_parts by neighbours which point the same way.
     near = cKDTree(points).query(points, k=min(NEIGHBOURS, m))[1].reshape(m, -1)
     alike = np.einsum("mki,mi->mk", normals[near], normals) > np.cos(FEATURE_ANGLE)
     rows = np.repeat(np.arange(m), alike.sum(axis=1))
-    piece = connected(m, rows, near[alike])
+    piece = number_parts(m, rows, near[alike])
 
     # Flat pieces are gathered by their planes; a curved piece is a face of its own.
     pieces_of_face: dict[tuple[float, ...] | int, list[Indices]] = {}

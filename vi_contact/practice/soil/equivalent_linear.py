@@ -155,7 +155,7 @@ def equivalent_linear(
     def run(values: Array) -> tuple[tuple[Any, Array], Array]:
         """Return the waves with these G/Gmax and xi: (surface, strains), and what these ask for."""
         reduction, damping = values
-        top, sheared = _waves(layers, stiff * reduction, damping, w, slope, below)
+        top, sheared = _solve_waves(layers, stiff * reduction, damping, w, slope, below)
         strain = np.abs(np.fft.irfft(sheared * motion, n)).max(axis=1)
         return (top, strain), soften(strain)
 
@@ -250,7 +250,7 @@ def iterate(
     )
 
 
-def _waves(
+def _solve_waves(
     layers: Sequence[Layer],
     shear: Array,
     xi: Array,

@@ -90,7 +90,7 @@ class FreeFieldSide:
 
     Attributes:
         space: of the body.
-        given: the side, as the user describes it.
+        side: as the user describes it.
         run: the run of the column.
         column: its elements.
 
@@ -99,18 +99,18 @@ class FreeFieldSide:
             rigid base, or held on a compliant one.
     """
 
-    def __init__(self, absorber: DashpotMatrix, given: FreeField, forms: Any) -> None:
+    def __init__(self, absorber: DashpotMatrix, side: FreeField, forms: Any) -> None:
         """Make the column.
 
         Args:
             absorber: the dashpots of the side.
-            given: the side.
+            side: as the user describes it.
             forms: of the body, with its materials.
         """
-        name = given.facets.name
+        name = side.facets.name
         self.space = absorber.space
-        self.given = given
-        self._ground = given.ground
+        self.side = side
+        self._ground = side.ground
         self.run = CompanionRun(f"FreeField on '{name}'", self._problem)
         if self.space.dimension != 2:
             raise InputError(
@@ -120,21 +120,21 @@ class FreeFieldSide:
             raise InputError("FreeField has a soil column of first order: give assemble degree=1")
         self._section: Section = forms.section
         self._dashpots = PetscMatrix(absorber.mat)
-        self.column, self._sign = _column(self.space, forms, self.given)
+        self.column, self._sign = _make_column(self.space, forms, self.side)
 
         # Nodes of the side on this rank, and the node of the column at the height of each.
-        self._blocks = self.space.facet_blocks(self.given.facets.indices)
+        self._blocks = self.space.facet_blocks(self.side.facets.indices)
         heights = self.space.points[self._blocks, 1]
         self._rows = np.abs(heights[:, None] - self.column.heights).argmin(axis=1)
         lowest = self._blocks[self._rows == 0]
-        held = total(self.space.comm, self.space.held[lowest].sum())
+        held_components = total(self.space.comm, self.space.held[lowest].sum())
         compliant = self._ground.lets_waves_in
-        if not compliant and held < 2:
+        if not compliant and held_components < 2:
             raise InputError(
                 f"the lowest node of free-field side '{name}' is not held: clamp or prescribe the "
                 "base, or give the side its CompliantBase"
             )
-        if compliant and held:
+        if compliant and held_components:
             raise InputError(
                 f"the lowest node of free-field side '{name}' is held, but its base is compliant: "
                 "leave the base free"
@@ -186,14 +186,14 @@ class FreeFieldSide:
         return self.space.pull(force.ravel())
 
 
-def _column(space: FemSpace, forms: Any, given: FreeField) -> tuple[SoilColumn, float]:
+def _make_column(space: FemSpace, forms: Any, side: FreeField) -> tuple[SoilColumn, float]:
     """Return the column beside the side, the same on every rank, and the sign of its normal.
 
     The sign is that of the x component of the side's outward normal.
     """
     mesh = space.mesh
-    name = given.facets.name
-    facets = given.facets.indices
+    name = side.facets.name
+    facets = side.facets.indices
     owned = facets[facets < mesh.topology.index_map(1).size_local]
 
     # A row for each facet of the side: its ends, the materials of its cell, where this cell is.

@@ -120,9 +120,9 @@ def base_motion(excitation: Excitation | Sequence[Excitation]) -> BaseMotion:
     """
     excitations = tuple(excitation) if isinstance(excitation, Sequence) else (excitation,)
     remedy = "give Harmonic(…), GroundMotion(record) or another"
-    for each in excitations:
-        provides("base_motion", "excitation", each, EXCITATION, remedy)
-    sizes = {len(each.direction) for each in excitations}
+    for one_excitation in excitations:
+        provides("base_motion", "excitation", one_excitation, EXCITATION, remedy)
+    sizes = {len(one_excitation.direction) for one_excitation in excitations}
     if len(sizes) != 1:
         raise InputError(
             "base_motion needs one or more excitations with directions of the same number of "
@@ -132,8 +132,9 @@ def base_motion(excitation: Excitation | Sequence[Excitation]) -> BaseMotion:
 
     # A free unit mass under the force a_g.
     forces = []
-    for each in excitations:
-        forces.append((np.asarray(each.direction, dtype=float), each.acceleration))
+    for one_excitation in excitations:
+        direction = np.asarray(one_excitation.direction, dtype=float)
+        forces.append((direction, one_excitation.acceleration))
     load = Load(np.zeros(d), tuple(forces))
     problem = linear_problem(sp.identity(d), None, sp.csr_matrix((d, d)), load, d)
     return BaseMotion(excitations, CompanionRun("base_motion", lambda: problem))

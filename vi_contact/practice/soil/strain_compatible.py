@@ -59,6 +59,8 @@ def strain_compatible(
 ) -> StrainCompatible[T]:
     """Run a model until G and xi of every cell are those of its effective strain. Collective.
 
+    Poisson's ratio is kept.
+
     Args:
         mesh: the mesh of the body.
         material: as for ``assemble``, of small strains; of Heterogeneous ones cells take the
@@ -70,8 +72,6 @@ def strain_compatible(
         ratio: of the effective to the largest strain.
         tolerance: of the largest relative change of G or xi in a cell.
         most: runs at most.
-
-    Poisson's ratio is kept.
 
     Returns:
         What the last run returned, with its material and its strain.
@@ -86,16 +86,13 @@ def strain_compatible(
     for group, own_curves in curves:
         indices = cells_of(OWNER, "the cells of curves", group, mesh).indices
         pairs.append((indices, own_curves))
-    named = _cells_with_curves(pairs)
-    doubled = len(np.unique(named)) < len(named)
-    refuse([f"{OWNER}: some cells have two curves: give one" if doubled else ""], comm)
+    _refuse_two_curves(pairs, comm)
     _refuse_lost_ratios(material, pairs, comm)
     space = compat.cell_space(mesh)
     place = compat.cell_blocks(space)[:, 0]
     E, nu, rho, xi = cell_constants(space, material)
-    orthotropic = np.isnan(E).any()
     fault = f"{OWNER}: Orthotropic has several G: give a LinearElastic"
-    refuse([fault if orthotropic else ""], comm)
+    refuse([fault if np.isnan(E).any() else ""], comm)
 
     def field(values: Array) -> Any:
         """Return the values of cells, those that this rank owns or all, as a Function."""
@@ -127,9 +124,28 @@ def strain_compatible(
     start = soften(np.zeros(len(place)))
     last, _, changes = iterate(OWNER, run_once, start, tolerance, most, comm)
     solution, body, effective = last
+    _refuse_strains_beyond_curves(mesh, effective.x.array[place], pairs, comm)
+    return StrainCompatible(solution, body, effective, changes)
 
-    # Of every pair the cell of largest strain has to lie within its curves.
-    strain = effective.x.array[place]
+
+def _refuse_two_curves(pairs: Sequence[tuple[Any, SoilCurves]], comm: MpiComm) -> None:
+    """Raise InputError for cells of two pairs. Collective."""
+    named = _list_cells_with_curves(pairs)
+    doubled = len(np.unique(named)) < len(named)
+    refuse([f"{OWNER}: some cells have two curves: give one" if doubled else ""], comm)
+
+
+def _refuse_strains_beyond_curves(
+    mesh: Any, strain: Array, pairs: Sequence[tuple[Any, SoilCurves]], comm: MpiComm
+) -> None:
+    """Raise InputError unless the cell of largest strain of every pair is within its curves.
+
+    Args:
+        mesh: the mesh of the body.
+        strain: the effective strain of all cells on this rank.
+        pairs: numbers of cells, and their curves.
+        comm: the ranks. Collective.
+    """
     middles = mesh.geometry.x[compat.geometry_dofmap(mesh)].mean(axis=1)[:, : mesh.geometry.dim]
     faults = []
     for cells, own_curves in pairs:
@@ -137,10 +153,9 @@ def strain_compatible(
             worst = cells[strain[cells].argmax()]
             faults.append(own_curves.beyond(strain[worst], f"at {at(middles[worst])}"))
     refuse(faults, comm)
-    return StrainCompatible(solution, body, effective, changes)
 
 
-def _cells_with_curves(pairs: Sequence[tuple[Any, SoilCurves]]) -> Any:
+def _list_cells_with_curves(pairs: Sequence[tuple[Any, SoilCurves]]) -> Any:
     """Return the numbers of all cells of the pairs on this rank, as often as they are named."""
     return np.concatenate([np.zeros(0, dtype=int), *(cells for cells, _ in pairs)])
 
@@ -154,7 +169,7 @@ def _refuse_lost_ratios(
     """
     if isinstance(material, KINDS):
         return  # of a whole mesh: cells beside the curves keep its ratio
-    named = _cells_with_curves(pairs)
+    named = _list_cells_with_curves(pairs)
     for cells, own_material in material:
         outside = largest(comm, len(np.setdiff1d(cells.indices, named)))
         if not outside and isinstance(own_material, LinearElastic) and own_material.xi:

@@ -16,7 +16,7 @@ from ....core.quantities import RATIO, Between, Positive, Unit, quantities
 
 History = Mapping[str, Array]  # column -> values (rows,)
 Inputs = Mapping[str, tuple[float, str]]  # name -> (value, unit)
-# expected, found, why it does not apply, inputs taken from the run
+# expected, found, why the formula does not apply, inputs taken from the run
 Numbers = tuple[float, float, str, Inputs]
 _RADIANS = "radians; 30 degrees are 0.5236"
 Length = Annotated[float, Positive, Unit("m")]
@@ -35,9 +35,16 @@ Incline = Annotated[
 class Comparison:
     """Hold a number of a run beside that of a formula, both in ``unit``.
 
-    name, formula, source: of the check; inputs: name -> (value, unit) of what went into the
-    formula; applies: empty, or the sentence that says why the formula does not apply: then
-    ``expected`` is nan. found: nan without its columns. range: where it applies, in words.
+    Attributes:
+        name: of the check.
+        formula: in signs.
+        source: author and year of the formula.
+        inputs: name -> (value, unit) of what went into the formula.
+        expected: number of the formula, nan where it does not apply.
+        found: number of the run, nan where the run has not recorded its columns.
+        unit: of both numbers.
+        applies: empty, or the sentence that says why the formula does not apply.
+        range: where the formula applies, in words.
     """
 
     name: str
@@ -83,6 +90,9 @@ class Check(ABC):
 
     This is the base of all checks, which are frozen dataclasses with fields in SI units and angles
     in radians. Each says in ``formula`` what it is.
+
+    Attributes:
+        of: which of the answers of the formula is compared; "" where there is one.
     """
 
     formula: ClassVar[Formula]
@@ -96,19 +106,20 @@ class Check(ABC):
 
     @abstractmethod
     def numbers(self, history: History) -> Numbers:
-        """Return both numbers, why they cannot be compared.
+        """Return both numbers, why they cannot be compared, and the inputs taken from the run.
 
-        With them come the inputs of the run, which has the columns.
+        The history has all columns that the formula reads.
         """
 
-    def given(self) -> Inputs:
-        """Return the fields that the formula takes."""
-        asked = quantities(type(self))
-        return {
-            key: (it, asked[key].symbol or "-")
-            for key in self.formula.fields
-            if (it := getattr(self, key)) is not None
-        }
+    def gather_inputs(self) -> Inputs:
+        """Return the fields that the formula takes, without those that are None."""
+        units = quantities(type(self))
+        inputs: dict[str, tuple[float, str]] = {}
+        for name in self.formula.fields:
+            value = getattr(self, name)
+            if value is not None:
+                inputs[name] = (value, units[name].symbol or "-")
+        return inputs
 
     def compare(self, history: History) -> Comparison:
         """Return the comparison for the history of a run.
@@ -118,18 +129,26 @@ class Check(ABC):
         columns = [column.format(**vars(self)) for column in self.formula.reads]
         lacking = [column for column in columns if column not in history]
         if lacking:
-            expected = found = math.nan
+            expected = math.nan
+            found = math.nan
             why = f"the run has no column {lacking[0]}: record it"
-            more: Inputs = {}
+            inputs_of_run: Inputs = {}
         else:
-            expected, found, why, more = self.numbers(history)
-        chosen = [name for name, value in vars(self).items() if value is True]
+            expected, found, why, inputs_of_run = self.numbers(history)
+
+        # Choices such as passive=True stand behind the name, and among the inputs as 1.
+        choices = [name for name, value in vars(self).items() if value is True]
+        words = [name.replace("_", " ") for name in choices]
         return Comparison(
-            name=", ".join([type(self).__name__, *(name.replace("_", " ") for name in chosen)]),
+            name=", ".join([type(self).__name__, *words]),
             formula=self.formula.text,
             source=self.formula.source,
             range=self.formula.range,
-            inputs={**self.given(), **dict.fromkeys(chosen, (1.0, "-")), **more},
+            inputs={
+                **self.gather_inputs(),
+                **dict.fromkeys(choices, (1.0, "-")),
+                **inputs_of_run,
+            },
             expected=math.nan if why else expected,
             found=found,
             unit=self.formula.answers[self.of],

@@ -39,26 +39,33 @@ def wedge(
     psi: float = 0.0,
     passive: bool = False,
 ) -> float:
-    """Return K of the worst plane wedge.
-
-    The wedge is active or passive, under gravity turned by psi; K is nan where none is at rest.
+    """Return K of the worst plane wedge, nan where none is at rest.
 
     K = cos²(phi -+ batter - psi) / (cos psi cos² batter cos(delta +- batter + psi) (1 +- root)²),
     root² = sin(phi + delta) sin(phi -+ slope - psi) / (cos(delta +- batter + psi) cos(slope -
     batter)); upper signs active, lower ones passive. Coulomb 1776; psi: Okabe 1924, Mononobe and
-    Matsuo 1929. Angles [rad].
+    Matsuo 1929.
+
+    Args:
+        phi: friction angle of the soil [rad].
+        delta: friction angle between soil and wall [rad].
+        slope: of the ground, rising from the wall [rad].
+        batter: of the wall's back from the vertical, positive where soil rests on it [rad].
+        psi: angle by which gravity is turned [rad].
+        passive: whether the wall is pushed into the soil.
     """
     sign = -1.0 if passive else 1.0
-    lean, open_ = math.cos(delta + sign * batter + psi), phi - sign * slope - psi
-    if open_ < 0.0 or lean <= 0.0 or math.cos(slope - batter) <= 0.0:
+    lean = math.cos(delta + sign * batter + psi)
+    spare = phi - sign * slope - psi  # angle by which the ground could still be steeper
+    if spare < 0.0 or lean <= 0.0 or math.cos(slope - batter) <= 0.0:
         return math.nan
     root = 1.0 + sign * math.sqrt(
-        math.sin(phi + delta) * math.sin(open_) / (lean * math.cos(slope - batter))
+        math.sin(phi + delta) * math.sin(spare) / (lean * math.cos(slope - batter))
     )
+    if not root > 0.0:
+        return math.nan
     top = math.cos(phi - sign * batter - psi) ** 2
-    return (
-        top / (math.cos(psi) * math.cos(batter) ** 2 * lean * root**2) if root > 0.0 else math.nan
-    )
+    return top / (math.cos(psi) * math.cos(batter) ** 2 * lean * root**2)
 
 
 WALL_FIELDS = ("height", "rho", "surcharge", "gravity", "width")
@@ -70,12 +77,16 @@ WALL_ANSWERS = {"thrust": "N/m", "height": "m"}
 class EarthPressure(Check):
     """Hold what all theories of a wall need.
 
-    That is its height [m], the soil's density [kg/m³], and what is compared.
-
-    part: of the contact, whose ``Resultants`` with their centre at the foot of the wall record
-    N_<part>, height_<part>, uplift_<part>; of: "thrust", N [N/m] per metre of wall, or "height", of
-    its line of action above the foot [m]; surcharge: q [Pa], on a horizontal metre of ground;
-    width: of the model across its plane, of a slice its thickness.
+    Attributes:
+        height: of the wall.
+        rho: density of the soil.
+        part: of the contact, whose ``Resultants`` with their centre at the foot of the wall record
+            N_<part>, height_<part>, uplift_<part>.
+        of: "thrust", N [N/m] per metre of wall, or "height", of its line of action above the foot
+            [m].
+        surcharge: q, on a horizontal metre of ground.
+        gravity: g.
+        width: of the model across its plane, of a slice its thickness.
     """
 
     # Whether the largest thrust of the run is compared, or that of the first row, the one of rest.
@@ -90,7 +101,7 @@ class EarthPressure(Check):
     width: Length = 1.0
 
     def coefficient(self) -> tuple[float, str]:
-        """Return the K of N, and why there is none."""
+        """Return the K of N, and why it does not apply, or ""."""
         raise NotImplementedError
 
     def numbers(self, history: History) -> Numbers:
@@ -99,23 +110,20 @@ class EarthPressure(Check):
         The height is that of rho g H²/2 at H/3 and of q H, times ``laden``, at H/2.
         """
         factor, why = self.coefficient()
-        slope, batter = (getattr(self, angle, 0.0) for angle in ("slope", "batter"))
-        # the ground of a wedge, by its size
+        slope = getattr(self, "slope", 0.0)
+        batter = getattr(self, "batter", 0.0)
+
+        # The load on the ground of a wedge, which is longer or shorter than its height.
         laden = math.cos(batter) * math.cos(slope) / math.cos(slope - batter)
-        own, extra = (
-            0.5 * self.rho * self.gravity * self.height**2,
-            laden * self.surcharge * self.height,
-        )
-        thrust, height = history[f"N_{self.part}"], history[f"height_{self.part}"]
+        weight = 0.5 * self.rho * self.gravity * self.height**2
+        load = laden * self.surcharge * self.height
+        thrust = history[f"N_{self.part}"]
+        height = history[f"height_{self.part}"]
         row = int(np.argmax(thrust)) if self.largest else 0
         if self.of == "height":
-            return (
-                self.height * (own / 3.0 + extra / 2.0) / (own + extra),
-                float(height[row]),
-                why,
-                {},
-            )
-        return factor * (own + extra), float(thrust[row]) / self.width, why, {}
+            expected = self.height * (weight / 3.0 + load / 2.0) / (weight + load)
+            return expected, float(height[row]), why, {}
+        return factor * (weight + load), float(thrust[row]) / self.width, why, {}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,7 +148,7 @@ class AtRest(EarthPressure):
     nu: Poisson
 
     def coefficient(self) -> tuple[float, str]:
-        """Return K, and why there is none."""
+        """Return K = K0, which always applies."""
         return self.nu / (1.0 - self.nu), ""
 
 
@@ -167,13 +175,15 @@ class Rankine(EarthPressure):
     passive: bool = False
 
     def coefficient(self) -> tuple[float, str]:
-        """Return K, and why there is none."""
-        # the soil slides up: the same lines, friction turned round
-        along = -self.slope if self.passive else self.slope
-        found = wedge(self.phi, along, self.slope, 0.0, passive=self.passive) * math.cos(self.slope)
-        return found, "the ground is steeper than the friction angle" if abs(
-            self.slope
-        ) > self.phi else ""
+        """Return K, and why it does not apply, or ""."""
+        # Rankine's thrust is that of Coulomb's wedge on a wall whose friction is along the ground.
+        # In passive failure the soil slides up: the same lines, friction turned round.
+        delta = -self.slope if self.passive else self.slope
+        K = wedge(self.phi, delta, self.slope, 0.0, passive=self.passive) * math.cos(self.slope)
+        why = ""
+        if abs(self.slope) > self.phi:
+            why = "the ground is steeper than the friction angle"
+        return K, why
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -206,16 +216,15 @@ class CoulombWedge(EarthPressure):
     passive: bool = False
 
     def coefficient(self, psi: float = 0.0) -> tuple[float, str]:
-        """Return K under gravity turned by psi [rad], and why there is none."""
-        most, sign = (0.5 * self.phi, "+") if self.passive else (self.phi, "-")
-        k = wedge(self.phi, self.delta, self.slope, self.batter, psi=psi, passive=self.passive)
-        why = "the ground is steeper than phi" if abs(self.slope) > self.phi else ""
-        why = (
-            f"phi {sign} slope - psi is below zero, psi = {psi:.4g}: no wedge is at rest"
-            if math.isnan(k)
-            else why
-        )
-        why = (
-            f"delta is above {most:.4g}: no plane wedge is the worst" if self.delta > most else why
-        )
-        return k * math.cos(self.delta), why
+        """Return K under gravity turned by psi [rad], and why it does not apply, or ""."""
+        largest_delta = 0.5 * self.phi if self.passive else self.phi
+        sign = "+" if self.passive else "-"
+        K = wedge(self.phi, self.delta, self.slope, self.batter, psi=psi, passive=self.passive)
+        why = ""
+        if abs(self.slope) > self.phi:
+            why = "the ground is steeper than phi"
+        if math.isnan(K):
+            why = f"phi {sign} slope - psi is below zero, psi = {psi:.4g}: no wedge is at rest"
+        if self.delta > largest_delta:
+            why = f"delta is above {largest_delta:.4g}: no plane wedge is the worst"
+        return K * math.cos(self.delta), why

@@ -15,31 +15,44 @@ from ....core.quantities import RATIO, Between, Positive
 from ....core.units import STANDARD_GRAVITY
 from .comparison import Check, Formula, Gravity, History, Incline, Length, Numbers
 
-# CHOSEN: of a step of the run; a slide ends within one, which costs less than r h²/8 of slip, h =
-# dt/32
+# CHOSEN: number of parts of a step of the run. A slide ends within one of them, which costs less
+# than r h²/8 of slip, h = dt/32.
 PARTS = 32
-ROUNDED = (
-    1e-9  # CHOSEN: share of alpha below which the first tilt is round-off of a block that stands
-)
-# CHOSEN: longest step of the rigid block, over 1/p: its angles are those of shorter steps to 0.1 %
+# CHOSEN: share of alpha below which the first tilt is round-off of a block that stands.
+ROUNDED = 1e-9
+# CHOSEN: longest step of the rigid block, over 1/p. Its angles are those of shorter steps to 0.1 %.
 FINE = 2e-4
+MOST_PARTS = 400  # of a step of the run, for a block of any size
 
 
-def sliding(t: Array, drive: Array, resist: Array, *, one_sided: bool = False) -> Array:
+def slide(t: Array, drive: Array, resist: Array, *, one_sided: bool = False) -> Array:
     """Return the displacement [m] at times t (n,) of u'' = w - r sgn(u') from rest.
 
     It sticks while |w| <= r.
 
-    drive w, resist r >= 0 [m/s²], (n,), linear between the times; one_sided: it never slides back,
-    u' >= 0.
+    Args:
+        t: (n,), rising [s].
+        drive: w (n,), linear between the times [m/s²].
+        resist: r >= 0 (n,), linear between the times [m/s²].
+        one_sided: whether it never slides back, u' >= 0.
     """
-    u, slip, speed, share = np.zeros(len(t)), 0.0, 0.0, (np.arange(PARTS) + 0.5) / PARTS
+    u = np.zeros(len(t))
+    slip = 0.0
+    speed = 0.0
+    share = (np.arange(PARTS) + 0.5) / PARTS
     for row, length in enumerate(np.diff(t) / PARTS):
-        push, hold = (length * (x[row] + share * (x[row + 1] - x[row])) for x in (drive, resist))
-        for gain, most in zip(push.tolist(), hold.tolist(), strict=True):
+        # Changes of speed in every part of the step: by the drive, and at most by the resistance.
+        gains = length * (drive[row] + share * (drive[row + 1] - drive[row]))
+        losses = length * (resist[row] + share * (resist[row + 1] - resist[row]))
+
+        # Implicit Euler for the speed: what resistance cannot take away is left. The slip follows
+        # by the trapezoidal rule.
+        for gain, loss in zip(gains.tolist(), losses.tolist(), strict=True):
             free = speed + gain
-            new = max(free - most, 0.0) - (0.0 if one_sided else max(-free - most, 0.0))
-            slip, speed = slip + 0.5 * length * (speed + new), new
+            backward = 0.0 if one_sided else max(-free - loss, 0.0)
+            new_speed = max(free - loss, 0.0) - backward
+            slip = slip + 0.5 * length * (speed + new_speed)
+            speed = new_speed
         u[row + 1] = slip
     return u
 
@@ -48,13 +61,17 @@ def sliding(t: Array, drive: Array, resist: Array, *, one_sided: bool = False) -
 class NewmarkBlock(Check):
     """Expect the displacement that is left after a motion.
 
-    The plane falls by ``slope`` [rad] towards +x.
+    It applies while the block stays on the plane, and where it stands without motion.
 
-    mu: friction, or in its place the yield acceleration over g of a level plane; one_sided: it
-    slides to one side only, as a wall before its fill does: to that of the sign of ``towards``
-    along x; 0: down the plane, +x if it is level; slip, acceleration, vertical: columns of the
-    displacement on the plane, signed, and of the ground's accelerations. It applies while the block
-    stays on the plane, and where it stands without motion.
+    Attributes:
+        mu: friction, or in its place the yield acceleration over g of a level plane.
+        slope: angle by which the plane falls towards +x.
+        one_sided: whether the block slides to one side only, as a wall before its fill does.
+        towards: whose sign is this side along x; 0: down the plane, +x if it is level.
+        gravity: g.
+        slip: column of the displacement on the plane, signed.
+        acceleration: column of the ground's acceleration along x.
+        vertical: column of the ground's acceleration upwards.
     """
 
     formula: ClassVar[Formula] = Formula(
@@ -80,38 +97,46 @@ class NewmarkBlock(Check):
 
     def numbers(self, history: History) -> Numbers:
         """Return both numbers, and why they cannot be compared."""
-        along, up = history[self.acceleration], history[self.vertical] + self.gravity
-        sine, cosine = math.sin(self.slope), math.cos(self.slope)
-        normal, drive = up * cosine + along * sine, up * sine - along * cosine
-        found = float(abs(history[self.slip][-1] - history[self.slip][0]))
+        along = history[self.acceleration]
+        up = history[self.vertical] + self.gravity
+        slip = history[self.slip]
+        found = float(abs(slip[-1] - slip[0]))
+
+        # Accelerations normal to the plane, and down it.
+        sine = math.sin(self.slope)
+        cosine = math.cos(self.slope)
+        normal = up * cosine + along * sine
+        drive = up * sine - along * cosine
+
+        why = ""
+        if not along.any():
+            why = f"the column {self.acceleration} is zero: name acceleration= that of the ground"
+        if normal.min() < 0.0:
+            why = "the ground falls away below the block"
+        if abs(sine) > self.mu * cosine:
+            why = "the block slides under its weight: |slope| is above atan(mu)"
         side = math.copysign(1.0, self.towards or self.slope or 1.0)
-        why = (
-            ""
-            if along.any()
-            else f"the column {self.acceleration} is zero: name acceleration= that of the ground"
-        )
-        why = "the ground falls away below the block" if normal.min() < 0.0 else why
-        why = (
-            "the block slides under its weight: |slope| is above atan(mu)"
-            if abs(sine) > self.mu * cosine
-            else why
-        )
-        moved = sliding(
-            history["t"], side * drive, self.mu * np.maximum(normal, 0.0), one_sided=self.one_sided
-        )
-        return abs(float(moved[-1])), found, why, {"a": (float(np.abs(along).max()), "m/s²")}
+        resist = self.mu * np.maximum(normal, 0.0)
+        displacement = slide(history["t"], side * drive, resist, one_sided=self.one_sided)
+        peak = float(np.abs(along).max())
+        return abs(float(displacement[-1])), found, why, {"a": (peak, "m/s²")}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Housner(Check):
     """Expect the largest angle of a uniform block, or the time of its first impact.
 
-    The block has this width and height [m].
+    It applies to blocks that rock and do not overturn, slide or bounce. One history in a long
+    motion is chaotic: compare many, or the first impacts.
 
-    of: "angle" [rad] or "impact" [s] after the first row; theta: column of the angle, anticlockwise
-    positive, whose first row is the start, at rest; acceleration, vertical: of the ground. It
-    applies to blocks that rock and do not overturn, slide or bounce. One history in a long motion
-    is chaotic: compare many, or the first impacts.
+    Attributes:
+        width: of the block.
+        height: of the block.
+        of: "angle" [rad] or "impact" [s] after the first row.
+        gravity: g.
+        theta: column of the angle, anticlockwise positive, whose first row is the start, at rest.
+        acceleration: column of the ground's acceleration along x.
+        vertical: column of the ground's acceleration upwards.
     """
 
     formula: ClassVar[Formula] = Formula(
@@ -137,61 +162,79 @@ class Housner(Check):
     acceleration: str = "a_g_x"
     vertical: str = "a_g_y"
 
-    def rocking(self, t: Array, ground: Array, theta: float) -> Array:
-        """Return the angle [rad] at times t (n,) from rest under a_x, g + a_y (2, n).
+    def rock(self, t: Array, ground: Array, theta: float) -> Array:
+        """Return the angle [rad] of the rigid block at all times; beyond alpha it stays.
 
-        Beyond alpha it stays.
+        Args:
+            t: (n,), rising [s].
+            ground: (2, n), a_x and g + a_y, linear between the times [m/s²].
+            theta: angle of the start, from rest [rad].
         """
-        alpha, angles, rate = math.atan(self.width / self.height), np.full(len(t), theta), 0.0
-        inertia, kept = 1.5 / math.hypot(self.width, self.height), 1.0 - 1.5 * math.sin(alpha) ** 2
+        alpha = math.atan(self.width / self.height)
+        angles = np.full(len(t), theta)
+        rate = 0.0
+        inertia = 1.5 / math.hypot(self.width, self.height)  # p²/g of the formula
+        restitution = 1.0 - 1.5 * math.sin(alpha) ** 2
         for row, length in enumerate(np.diff(t)):
-            # of sizes none has, fewer
-            parts = min(math.ceil(length * math.sqrt(inertia * self.gravity) / FINE), 400)
+            # A block that needs more parts than MOST_PARTS is of a size that none has.
+            parts = min(math.ceil(length * math.sqrt(inertia * self.gravity) / FINE), MOST_PARTS)
             share = (np.arange(parts) + 0.5) / parts
-            for push, pull in (
-                ground[:, row, None] + np.diff(ground[:, row : row + 2]) * share
-            ).T.tolist():
-                lean, left = math.copysign(1.0, theta or rate or push), alpha - abs(theta)
-                falls = inertia * (push * math.cos(left) - lean * pull * math.sin(left))
-                if theta == rate == 0.0 and falls * lean <= 0.0 or left < 0.0:
+            middles = ground[:, row, None] + np.diff(ground[:, row : row + 2]) * share
+            for push, pull in middles.T.tolist():
+                # About which foot it leans, and the angle from there to overturning.
+                lean = math.copysign(1.0, theta or rate or push)
+                reserve = alpha - abs(theta)
+                acceleration = inertia * (
+                    push * math.cos(reserve) - lean * pull * math.sin(reserve)
+                )
+                stands = theta == rate == 0.0 and acceleration * lean <= 0.0
+                if stands or reserve < 0.0:
                     continue
-                rate += length / parts * falls
-                new = theta + length / parts * rate
-                theta, rate = (kept * new, kept * rate) if new * theta < 0.0 else (new, rate)
+
+                # Symplectic Euler; an impact within the part takes its share of angle and rate.
+                rate += length / parts * acceleration
+                new_theta = theta + length / parts * rate
+                if new_theta * theta < 0.0:
+                    theta = restitution * new_theta
+                    rate = restitution * rate
+                else:
+                    theta = new_theta
             angles[row + 1] = theta
         return angles
 
     def numbers(self, history: History) -> Numbers:
-        """Return both numbers, and why they cannot be compared."""
-        t, angle, alpha = history["t"], history[self.theta], math.atan(self.width / self.height)
+        """Return both numbers, why they cannot be compared, alpha and the angle of the start."""
+        t = history["t"]
+        angle = history[self.theta]
+        alpha = math.atan(self.width / self.height)
         ground = np.array([history[self.acceleration], self.gravity + history[self.vertical]])
         start = float(angle[0]) if abs(angle[0]) > ROUNDED * alpha else 0.0
-        rigid = self.rocking(t, ground, start)
-        both = (
-            float(np.abs(one).max()) if self.of == "angle" else landing(t, one)
-            for one in (rigid, angle)
-        )
-        expected, found = both
-        why = (
-            ""
-            if self.width < math.sqrt(2.0) * self.height
-            else "the first impact stops a block as wide as this"
-        )
-        why = why or ("" if ground[1].min() > 0.0 else "the ground falls away below the block")
-        why = why or (
-            ""
-            if rigid.any()
-            else f"{self.acceleration} stays below (g + a_y) b/h: the block does not rock"
-        )
-        why = why or ("" if np.abs(rigid).max() < alpha else "the rigid block overturns")
-        why = why or ("the rigid block does not land in this time" if math.isnan(expected) else "")
+        rigid = self.rock(t, ground, start)
+        if self.of == "angle":
+            expected = float(np.abs(rigid).max())
+            found = float(np.abs(angle).max())
+        else:
+            expected = find_impact(t, rigid)
+            found = find_impact(t, angle)
+
+        why = ""
+        if not self.width < math.sqrt(2.0) * self.height:
+            why = "the first impact stops a block as wide as this"
+        elif not ground[1].min() > 0.0:
+            why = "the ground falls away below the block"
+        elif not rigid.any():
+            why = f"{self.acceleration} stays below (g + a_y) b/h: the block does not rock"
+        elif not np.abs(rigid).max() < alpha:
+            why = "the rigid block overturns"
+        elif math.isnan(expected):
+            why = "the rigid block does not land in this time"
         return expected, found, why, {"alpha": (alpha, "rad"), "theta0": (start, "rad")}
 
 
-def landing(t: Array, theta: Array) -> float:
-    """Return the time [s] from the first row until the angle is zero.
+def find_impact(t: Array, theta: Array) -> float:
+    """Return the time [s] from the first row until the angle is zero, or nan if it never is.
 
-    That holds once it was above 1e-3 of its largest; the time is nan if it never is.
+    Angles before it first exceeds 1e-3 of its largest do not count.
     """
     start = int(np.argmax(np.abs(theta) > 1e-3 * np.abs(theta).max()))
     row = start + int(np.argmax(theta[start:] * theta[start] <= 0.0))

@@ -12,7 +12,8 @@ def recognises(text: TextFile) -> bool:
     head = [line.strip().upper() for line in text.heads[:60]]
     titled = any(line.startswith("STRONG GROUND MOTION RECORDS OF TURK") for line in head)
     columns = any(tuple(line.split()) == COMPONENTS for line in head)
-    return titled or columns and any(line.startswith("SAMPLING INTERVAL (SEC)") for line in head)
+    step = any(line.startswith("SAMPLING INTERVAL (SEC)") for line in head)
+    return titled or (columns and step)
 
 
 def read(text: TextFile) -> Record:

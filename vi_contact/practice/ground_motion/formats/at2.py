@@ -11,7 +11,7 @@ import re
 from itertools import pairwise
 
 from ....core.errors import InputError
-from ..record import Record, canonical_units, known_units
+from ..record import Record, canonical_units, recognise_units
 from .statements import Statement, agree, find_counts, find_steps, refuse_other_motion
 from .text import NUMBER, TextFile
 
@@ -74,7 +74,7 @@ def read(text: TextFile) -> Record:
 
     Units and dt are needed only where the file does not state them.
     """
-    npts, stated_dt, start = _header(text)
+    npts, stated_dt, start = _read_header(text)
     filled_lines = [index for index in range(start) if text.heads[index].strip()]
     believed = [index for index in filled_lines if not _is_title_of_ours(text, index)]
     header = [" ".join(text.heads[index].split()) for index in filled_lines]
@@ -91,7 +91,7 @@ def read(text: TextFile) -> Record:
         values,
         units=units,
         line=line,
-        dt=stated_dt and stated_dt[1],
+        dt=stated_dt[1] if stated_dt else None,
         lines=lines,
         title=title,
         format="PEER AT2",
@@ -122,7 +122,9 @@ def _find_units(text: TextFile, indices: list[int]) -> tuple[int | None, str | N
         return None, None
     first_line, first_units = statements[0]
     for index, units in statements[1:]:
-        if known_units(units) is not None and known_units(units) != known_units(first_units):
+        if recognise_units(units) is not None and recognise_units(units) != recognise_units(
+            first_units
+        ):
             raise InputError(
                 f"{text.at(index)}: the header states units as {units}, but line {first_line + 1} "
                 f"states them as {first_units}; correct the file, or get it again"
@@ -130,26 +132,26 @@ def _find_units(text: TextFile, indices: list[int]) -> tuple[int | None, str | N
     return first_line, first_units
 
 
-def _header(text: TextFile) -> tuple[Statement | None, Statement | None, int]:
+def _read_header(text: TextFile) -> tuple[Statement | None, Statement | None, int]:
     """Return NPTS and DT, each with its line or None, and the index of the first data line."""
     counts: list[Statement] = []
     steps: list[Statement] = []
     begin = begin_data(text)
     last = 0  # the last line that states one of both
     for index, line in enumerate(text.heads[: HEADER_LINES if begin is None else begin]):
-        both = _VALUES_FIRST.search(line)
+        count_and_step = _VALUES_FIRST.search(line)
         count = _NPTS.search(line)
         step = _DT.search(line)
-        if begin is None and counts and (both or count):
+        if begin is None and counts and (count_and_step or count):
             raise InputError(f"{text.at(index)}: NPTS is stated a second time; give one record")
-        if both:
-            counts.append((index, text.number(index, both[1])))
-            steps.append((index, text.number(index, both[2])))
+        if count_and_step:
+            counts.append((index, text.number(index, count_and_step[1])))
+            steps.append((index, text.number(index, count_and_step[2])))
         if count:
             counts.append((index, text.number(index, count[1])))
         if step:
             steps.append((index, text.number(index, step[1])))
-        if both or count or step:
+        if count_and_step or count or step:
             last = index
     start = last + 1 if begin is None else begin
 

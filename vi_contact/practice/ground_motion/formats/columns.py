@@ -82,26 +82,26 @@ def read(text: TextFile) -> Record:
     which of several components, from 1, or its name in the heading. With dt and without channel,
     rows of three or more values are read one after the other, unless the first column is a time.
     """
-    header, lines = _parts(text)
+    header, lines = _split_lines(text)
     rows = list(text.rows(lines))
-    header, lines, rows, facts = _header(text, header, lines, rows)
+    header, lines, rows, facts = _read_header(text, header, lines, rows)
     if len(rows) < 2 and len(rows[0] if rows else ()) < (3 if text.dt is None else 2):
         raise InputError(f"{text.path}: the file has {len(rows)} samples; give two or more")
     text.refuse_uneven_rows(lines, rows)
     text.refuse_misaligned(lines)
     step_known = facts.step is not None or text.dt is not None
-    leading = _leading(text, lines, rows, facts)
+    leading = _find_leading_columns(text, lines, rows, facts)
     if not leading and _is_series(text, lines, rows, facts, step_known):
-        return _series(text, header, lines, rows, facts)
+        return _read_series(text, header, lines, rows, facts)
     if len(rows[-1]) != len(rows[0]):
         raise InputError(
             f"{text.at(lines[-1])}: {len(rows[-1])} columns instead of {len(rows[0])}; a value is "
             "missing, get the complete file"
         )
-    return _component(text, header, lines, np.array(rows), facts, leading)
+    return _read_component(text, header, lines, np.array(rows), facts, leading)
 
 
-def _parts(text: TextFile) -> tuple[list[int], list[int]]:
+def _split_lines(text: TextFile) -> tuple[list[int], list[int]]:
     """Return the indices of the lines of the header, and of the numbers."""
     start = begin_data(text) or 0
     header = list(range(start))
@@ -132,7 +132,7 @@ def _is_words(line: str) -> bool:
     return is_ruler and len(line) > 2 and "*" not in line
 
 
-def _header(
+def _read_header(
     text: TextFile, header: list[int], lines: list[int], rows: list[list[float]]
 ) -> tuple[list[int], list[int], list[list[float]], _Header]:
     """Return the lines of the header, those of the numbers, the numbers, what the header says.
@@ -156,7 +156,7 @@ def _header(
             return header, lines, rows, facts
     counts = find_counts(text, header)
     steps = find_steps(text, header)
-    first = _count_and_step(rows) if len(rows) > 2 else None
+    first = _find_count_and_step(rows) if len(rows) > 2 else None
     if first is not None:
         # The two lines of eqsig: a label, then number of samples and time step; or the number
         # alone.
@@ -193,21 +193,21 @@ class _First(NamedTuple):
     rows: int  # how many rows say so
 
 
-def _count_and_step(rows: Sequence[Sequence[float]]) -> _First | None:
+def _find_count_and_step(rows: Sequence[Sequence[float]]) -> _First | None:
     """Return the number of samples, and the time step, that stand before the samples, or None.
 
     They are two numbers before rows of one, of which the first is whole; or one number, or two on
     two lines, before exactly as many numbers as it says.
     """
     first = rows[0]
-    others = rows[1:]
+    later_rows = rows[1:]
     count = first[0]
     if count != round(count) or count < 2.0:
         return None
-    values = sum(len(row) for row in others)
+    values = sum(len(row) for row in later_rows)
     if len(first) == 2 and 0.0 < first[1] < 1.0:
-        single = all(len(row) == 1 for row in others)
-        agrees = count in (values, len(others)) and len(others[0]) != 2
+        single = all(len(row) == 1 for row in later_rows)
+        agrees = count in (values, len(later_rows)) and len(later_rows[0]) != 2
         if single or agrees:
             return _First(count, first[1], 1)
     if len(first) == 1 and count == values:
@@ -217,13 +217,19 @@ def _count_and_step(rows: Sequence[Sequence[float]]) -> _First | None:
     return None
 
 
-def _leading(
+def _find_leading_columns(
     text: TextFile, lines: Sequence[int], rows: Sequence[Sequence[float]], facts: _Header
 ) -> list[int]:
     """Return the columns that are no motion: numbers of samples and, the last of them, the time.
 
     The heading decides. Without one they are the first columns that count up evenly; of two columns
     the first one, if it rises. Rows that follow one another rise together, and have no time.
+
+    Args:
+        text: the file.
+        lines: indices of the lines of the rows.
+        rows: the numbers.
+        facts: what the header says.
     """
     width = len(rows[0])
     if facts.columns is not None and len(facts.columns) == width:
@@ -265,7 +271,14 @@ def _rises_in_rows(rows: Sequence[Sequence[float]]) -> bool:
 def _counts_up(
     text: TextFile, lines: Sequence[int], rows: Sequence[Sequence[float]], column: int
 ) -> bool:
-    """Tell whether a column counts up evenly."""
+    """Tell whether a column counts up evenly.
+
+    Args:
+        text: the file.
+        lines: indices of the lines of the rows.
+        rows: the numbers.
+        column: number of the column, from 0.
+    """
     times = np.array([row[column] for row in rows])
     return rises_evenly(times, decimals=text.decimals(lines, column))
 
@@ -334,7 +347,7 @@ def _is_series(
     return True
 
 
-def _series(
+def _read_series(
     text: TextFile,
     header: Sequence[int],
     lines: Sequence[int],
@@ -365,10 +378,10 @@ def _series(
     if facts.count is not None:
         count_line, count = facts.count
         text.refuse_other_count(count_line, count, len(values))
-    return _record(text, header, facts, values, line_of_value, facts.dt)
+    return _make_record(text, header, facts, values, line_of_value, facts.dt)
 
 
-def _component(
+def _read_component(
     text: TextFile,
     header: Sequence[int],
     lines: Sequence[int],
@@ -419,11 +432,11 @@ def _component(
     if leading:
         time_place = leading[-1]
         decimals = text.decimals(lines, time_place)
-        samples, step, rounding = _on_times(
+        samples, step, rounding = _bring_to_even_times(
             text, lines, table[:, time_place], samples, facts, columns[time_place], decimals
         )
         step_from = "times in the file"
-    return _record(
+    return _make_record(
         text,
         header,
         facts,
@@ -436,7 +449,7 @@ def _component(
     )
 
 
-def _on_times(
+def _bring_to_even_times(
     text: TextFile,
     lines: Sequence[int],
     times: Array,
@@ -460,7 +473,7 @@ def _on_times(
     """
     unit = TIME_UNITS.get((column.unit or "").strip().lower().replace("sec", "s"))
     stated = facts.dt
-    given = text.dt if stated is None else stated  # by the file or its caller
+    dt = text.dt if stated is None else stated  # that the file or its caller states
     usual = float(np.median(np.diff(times)))
     rising = bool(np.all(np.diff(times) > 0.0))
     if column.unit is not None and unit is None:
@@ -470,19 +483,19 @@ def _on_times(
 
     # Numbers of samples?
     numbered = usual == 1.0 and unit is None and rises_evenly(times, decimals=decimals)
-    other_step = given is not None and given != 1.0
+    other_step = dt is not None and dt != 1.0
     if column.kind == "number" or (numbered and other_step):
         facts.notes.append("the first column counts the samples")
         return samples, stated, SAME_STEP
 
-    # Seconds or milliseconds? A time step that is given tells.
-    in_ms = given is not None and abs(1e-3 * usual - given) <= 1e-3 * given
+    # Seconds or milliseconds? A time step that is stated tells.
+    in_ms = dt is not None and abs(1e-3 * usual - dt) <= 1e-3 * dt
     if unit is None and rising and in_ms:
         unit = 1e-3
         facts.doubts.append("the times are taken to be milliseconds, as the time step says")
-    agrees = given is not None and abs(usual - given) <= 1e-3 * given
+    agrees = dt is not None and abs(usual - dt) <= 1e-3 * dt
     if unit is None and rising and usual >= LONGEST_TIME_STEP and not agrees:
-        but = "" if given is None else f", but not with a time step of {given:g} s"
+        but = "" if dt is None else f", but not with a time step of {dt:g} s"
         raise InputError(
             f"{text.at(lines[1])}: the first column counts up by {usual:g}, which may be seconds, "
             f"milliseconds or numbers of samples{but}; pass the time step that they mean as dt= in "
@@ -495,8 +508,8 @@ def _on_times(
     if uneven:
         samples = interpolate(seconds, samples, step)
         facts.notes.append(f"uneven times interpolated linearly to a step of {step:g} s")
-    elif given is not None and abs(step - given) <= rounding * given:
-        step = given if rounding > SAME_STEP else step
+    elif dt is not None and abs(step - dt) <= rounding * dt:
+        step = dt if rounding > SAME_STEP else step
     elif stated is not None:
         raise InputError(
             f"{text.at(facts.step[0] if facts.step else 0)}: the header states a time step of "
@@ -507,7 +520,7 @@ def _on_times(
     return samples, step, max(rounding, SAME_STEP)
 
 
-def _record(
+def _make_record(
     text: TextFile,
     header: Sequence[int],
     facts: _Header,

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from ....core.errors import InputError
-from ..record import Record, known_units
+from ..record import Record, recognise_units
 from .statements import agree
 from .text import NUMBER, TextFile
 
@@ -103,23 +103,23 @@ def read(text: TextFile) -> Record:
 
     ``channel`` is 1 for the first of the file, required where it holds several.
     """
-    blocks = _blocks(text)
+    blocks = _find_blocks(text)
     if not blocks:
         raise InputError(
             f"{text.at(0)}: no block of accelerations follows, which a line such as '7500 points "
             "of accel data equally spaced at .010 sec, in cm/sec2. (8f10.6)' begins; other layouts "
             "are not read, write columns of time and acceleration"
         )
-    block = blocks[text.choose([_component(text, block) for block in blocks])]
+    block = blocks[text.choose([_find_component(text, block) for block in blocks])]
     line = text.heads[block.line]
     if _UNEVEN.search(line):
         raise InputError(
             f"{text.at(block.line)}: the samples are unequally spaced; get the corrected file (V2)"
         )
-    words, comments = _words(text, block)
+    words, comments = _read_words(text, block)
     cosmos = "format v" in text.heads[0].lower()
     event = next(filter(_EVENT.match, words), " ".join(words[1:2] if cosmos else words[2:3]))
-    samples, lines = _samples(text, block)
+    samples, lines = _read_samples(text, block)
 
     # The units stand on the line of the block, or with a peak that the samples have.
     units_line: int = block.line
@@ -129,24 +129,24 @@ def read(text: TextFile) -> Record:
         if match:
             units = match[1]
     if units is None:
-        of_peak = _peak_units(text, block, samples)
+        of_peak = _find_peak_units(text, block, samples)
         if of_peak is not None:
             units_line, units = of_peak
     return text.record(
         samples,
         lines=lines,
         units=units,
-        dt=_step(text, block),
+        dt=_find_step(text, block),
         line=units_line,
         title=event,
         format="COSMOS" if cosmos else "CSMIP",
         notes=(*words, *comments),
-        station=_station(text, block),
-        component=_component(text, block),
+        station=_find_station(text, block),
+        component=_find_component(text, block),
     )
 
 
-def _blocks(text: TextFile) -> list[Block]:
+def _find_blocks(text: TextFile) -> list[Block]:
     """Return the blocks of accelerations.
 
     Blocks of other quantities belong to the channel before them.
@@ -189,7 +189,7 @@ def _read_announcement(text: TextFile, index: int) -> tuple[int, str] | None:
     return int(text.number(index, count[1])), quantity[1].lower()
 
 
-def _words(text: TextFile, block: Block) -> tuple[list[str], list[str]]:
+def _read_words(text: TextFile, block: Block) -> tuple[list[str], list[str]]:
     """Return the text of a channel's header, and its comments, with blanks squeezed.
 
     The text ends where numbers begin.
@@ -205,7 +205,7 @@ def _words(text: TextFile, block: Block) -> tuple[list[str], list[str]]:
     return words, [comment for comment in comments if comment]
 
 
-def _samples(text: TextFile, block: Block) -> tuple[list[float], list[int]]:
+def _read_samples(text: TextFile, block: Block) -> tuple[list[float], list[int]]:
     """Return the samples in the file's units, and the index of the line of each."""
     marks = [text.number(index, mark[1]) for index, mark in _search(text, block.header, _UNKNOWN)]
     unknown = marks[0] if marks else None
@@ -214,11 +214,11 @@ def _samples(text: TextFile, block: Block) -> tuple[list[float], list[int]]:
     for index in range(block.line + 1, block.end):
         line = text.lines[index].rstrip() if index < len(text.lines) else ""
         fields = -(-len(line) // block.width)
-        wanted = min(block.per_line, block.count - len(values))
-        if fields != wanted:
+        expected = min(block.per_line, block.count - len(values))
+        if fields != expected:
             raise InputError(
                 f"{text.at(block.line)}: {block.count:.12g} samples are announced but line "
-                f"{index + 1} holds {fields} of them instead of {wanted:g}; get the complete file"
+                f"{index + 1} holds {fields} of them instead of {expected:g}; get the complete file"
             )
         row = text.cut_fields(index, block.width)
         if unknown in row:
@@ -239,7 +239,7 @@ def _samples(text: TextFile, block: Block) -> tuple[list[float], list[int]]:
     return values, lines
 
 
-def _step(text: TextFile, block: Block) -> float | None:
+def _find_step(text: TextFile, block: Block) -> float | None:
     """Return the time step that is stated with the samples, or in the header, or None."""
     rate = _RATE.search(text.heads[block.line])
     if rate and text.number(block.line, rate[1]) > 0.0:
@@ -248,12 +248,12 @@ def _step(text: TextFile, block: Block) -> float | None:
     for index, spaced in _search(text, (block.line, *block.header), _SPACED):
         steps.append((index, text.number(index, spaced[1])))
     if not steps:
-        return _step_among_reals(text, block)
+        return _find_step_among_reals(text, block)
     statement = agree(text, "the time step", steps)
     return statement[1] if statement else None
 
 
-def _step_among_reals(text: TextFile, block: Block) -> float | None:
+def _find_step_among_reals(text: TextFile, block: Block) -> float | None:
     """Return the time step among the real numbers of the header, or None."""
     for index, reals in _search(text, block.header, _REALS):
         form = _FORMAT.search(text.heads[index])
@@ -268,17 +268,17 @@ def _step_among_reals(text: TextFile, block: Block) -> float | None:
     return None
 
 
-def _peak_units(text: TextFile, block: Block, samples: list[float]) -> tuple[int, str] | None:
+def _find_peak_units(text: TextFile, block: Block, samples: list[float]) -> tuple[int, str] | None:
     """Return the line and the units of a peak that the header states and the samples have."""
     for index, match in _search(text, block.header, _PEAK):
         peak = abs(text.number(index, match[1]))
-        largest = max(map(abs, samples))
-        if known_units(match[2]) is not None and abs(largest - peak) <= 1e-3 * peak:
+        largest = max(map(abs, samples), default=0.0)
+        if recognise_units(match[2]) is not None and abs(largest - peak) <= 1e-3 * peak:
             return index, match[2]
     return None
 
 
-def _component(text: TextFile, block: Block) -> str:
+def _find_component(text: TextFile, block: Block) -> str:
     """Return the direction of the channel in the header, such as "90 Deg" or "UP"."""
     for _, match in _search(text, block.header, _CHANNEL):
         direction, *_ = _FROM.split(match[2], maxsplit=1)
@@ -289,7 +289,7 @@ def _component(text: TextFile, block: Block) -> str:
     return ""
 
 
-def _station(text: TextFile, block: Block) -> str:
+def _find_station(text: TextFile, block: Block) -> str:
     """Return the number or code of the station, from the text of the header."""
     for _, match in _search(text, block.header, _STATION):
         code = _CODE.search(match[1]) or match

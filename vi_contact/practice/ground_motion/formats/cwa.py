@@ -8,19 +8,20 @@ import re
 
 import numpy as np
 
+from ....core.algebra import Array
 from ....core.errors import InputError
 from ..record import Record
-from .text import SAME_STEP, TextFile
+from .text import SAME_STEP, Entries, TextFile
 from .times import time_step
 
-_FORMAT = re.compile(r"^(\d++)F(\d++)\.(\d++)$", re.IGNORECASE)
+_FORMAT = re.compile(r"^(\d{1,4}+)F(\d{1,4}+)\.(\d{1,4}+)$", re.IGNORECASE)
 _UNIT = re.compile(r"[a-z0-9/^]++", re.IGNORECASE)
 _DIRECTION = re.compile(r"^([^()]*+)\(([+-])\)$")
 
 
 def recognises(text: TextFile) -> bool:
     """Tell whether two of the three entries are there that say what the columns are."""
-    header = _header(text)
+    header = _read_header(text)
     keys = ("SAMPLERATE(HZ)", "AMPLITUDEUNIT", "DATASEQUENCE")
     return sum(key in header for key in keys) >= 2
 
@@ -30,7 +31,7 @@ def read(text: TextFile) -> Record:
 
     ``channel`` is 1 for the one after the time, or its name such as "U".
     """
-    header = _header(text)
+    header = _read_header(text)
     sequence_line, sequence = text.entry(header, "DATASEQUENCE")
     first, *names = [" ".join(part.split()) for part in re.split(r"[;\s]+", sequence) if part]
     if first.lower() != "time" or not names:
@@ -39,10 +40,11 @@ def read(text: TextFile) -> Record:
             "the file again"
         )
     form_line, form = text.entry(header, "DATA")
+    columns = len(names) + 1
     fields = _FORMAT.match(form)
-    if fields is None or int(fields[1]) != len(names) + 1:
+    if fields is None or int(fields[1]) != columns or int(fields[2]) < 1:
         raise InputError(
-            f"{text.at(form_line)}: the format {form!r} is not one of {len(names) + 1} columns, as "
+            f"{text.at(form_line)}: the format {form!r} is not one of {columns} columns, as "
             "'4F10.3' is; get the file again"
         )
 
@@ -55,40 +57,8 @@ def read(text: TextFile) -> Record:
         points_down.append(direction is not None and direction[2] == "-")
     place = text.choose(plain_names)
 
-    data = text.find_filled(form_line + 1)
-    lines = [index for index in data if not text.lines[index].startswith("#")]
-    rows = []
-    for index in lines:
-        row = text.cut_fields(index, int(fields[2]))
-        if len(row) != len(names) + 1:
-            raise InputError(
-                f"{text.at(index)}: {len(row)} values instead of {len(names) + 1}; a value is "
-                "missing or too many, get the complete file"
-            )
-        rows.append(row)
-
-    # Rate, duration, number of samples and times have to agree.
-    rate_line, _ = text.entry(header, "SAMPLERATE(HZ)")
-    rate = text.entry_number(header, "SAMPLERATE(HZ)")
-    seconds_line, _ = text.entry(header, "RECORDLENGTH(SEC)")
-    seconds = text.entry_number(header, "RECORDLENGTH(SEC)")
-    if rate <= 0.0 or len(rows) < 2:
-        raise InputError(
-            f"{text.at(rate_line)}: {len(rows)} samples at {rate:g} Hz are no record; get the "
-            "complete file"
-        )
-    if not abs(len(rows) - seconds * rate) <= 0.5:
-        raise InputError(
-            f"{text.at(seconds_line)}: {seconds:g} s at {rate:g} Hz "
-            f"are announced but {len(rows)} samples follow; get the complete file"
-        )
-    table = np.array(rows)
-    step, rounding, uneven = time_step(text, lines, table[:, 0], decimals=int(fields[3]))
-    if uneven or not math.isclose(step, 1.0 / rate, rel_tol=max(rounding, SAME_STEP)):
-        raise InputError(
-            f"{text.at(rate_line)}: {rate:g} Hz are announced but the times count up by {step:g} "
-            "s; get the complete file"
-        )
+    lines, table = _read_rows(text, form_line + 1, columns, int(fields[2]))
+    rate_line, rate = _check_rate(text, header, lines, table[:, 0], int(fields[3]))
     units_line, units = text.entry(header, "AMPLITUDEUNIT")
     unit = _UNIT.match(units)
     _, station = header.get("STATIONCODE", (0, ""))
@@ -111,7 +81,68 @@ def read(text: TextFile) -> Record:
     )
 
 
-def _header(text: TextFile) -> dict[str, tuple[int, str]]:
+def _read_rows(text: TextFile, start: int, columns: int, width: int) -> tuple[list[int], Array]:
+    """Return the indices of the lines of numbers, and the numbers, (rows, columns).
+
+    Args:
+        text: the file.
+        start: index of the first line that may hold numbers.
+        columns: number of columns.
+        width: of the columns, in characters.
+    """
+    data = text.find_filled(start)
+    lines = [index for index in data if not text.lines[index].startswith("#")]
+    rows = []
+    for index in lines:
+        row = text.cut_fields(index, width)
+        if len(row) != columns:
+            raise InputError(
+                f"{text.at(index)}: {len(row)} values instead of {columns}; a value is "
+                "missing or too many, get the complete file"
+            )
+        rows.append(row)
+    return lines, np.array(rows).reshape(-1, columns)
+
+
+def _check_rate(
+    text: TextFile, header: Entries, lines: list[int], times: Array, decimals: int
+) -> tuple[int, float]:
+    """Return the line of the sampling rate, and the rate [Hz].
+
+    Raises InputError where duration, number of samples and times do not agree with it.
+
+    Args:
+        text: the file.
+        header: its entries.
+        lines: indices of the lines of numbers.
+        times: (rows,), on these [s].
+        decimals: of the times as they are printed.
+    """
+    count = len(lines)
+    rate_line, _ = text.entry(header, "SAMPLERATE(HZ)")
+    rate = text.entry_number(header, "SAMPLERATE(HZ)")
+    seconds_line, _ = text.entry(header, "RECORDLENGTH(SEC)")
+    seconds = text.entry_number(header, "RECORDLENGTH(SEC)")
+    if rate <= 0.0 or count < 2:
+        raise InputError(
+            f"{text.at(rate_line)}: {count} samples at {rate:g} Hz are no record; get the "
+            "complete file"
+        )
+    if not abs(count - seconds * rate) <= 0.5:
+        raise InputError(
+            f"{text.at(seconds_line)}: {seconds:g} s at {rate:g} Hz "
+            f"are announced but {count} samples follow; get the complete file"
+        )
+    step, rounding, uneven = time_step(text, lines, times, decimals=decimals)
+    if uneven or not math.isclose(step, 1.0 / rate, rel_tol=max(rounding, SAME_STEP)):
+        raise InputError(
+            f"{text.at(rate_line)}: {rate:g} Hz are announced but the times count up by {step:g} "
+            "s; get the complete file"
+        )
+    return rate_line, rate
+
+
+def _read_header(text: TextFile) -> dict[str, tuple[int, str]]:
     """Return the line and the value of every key of "#Key: value"; of two alike the first."""
     entries: dict[str, tuple[int, str]] = {}
     for index, line in enumerate(text.heads[:60]):

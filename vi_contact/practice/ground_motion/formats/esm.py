@@ -16,7 +16,7 @@ _KEY = re.compile(r"[A-Z][A-Z0-9_/^ ]*+")
 
 def recognises(text: TextFile) -> bool:
     """Tell whether line 1 is an entry "KEY: value", and one of the first 100 is of such a file."""
-    entries = [_entry(line) for line in text.heads[:100]]
+    entries = [_split_entry(line) for line in text.heads[:100]]
     if entries[0] is None:
         return False
     keys = {entry[0] for entry in entries if entry is not None}
@@ -25,7 +25,7 @@ def recognises(text: TextFile) -> bool:
 
 def read(text: TextFile) -> Record:
     """Return the record of an ESM ASCII file; units and dt are only checked."""
-    entries = list(takewhile(bool, map(_entry, text.heads)))
+    entries = list(takewhile(bool, map(_split_entry, text.heads)))
     header = {entry[0]: (index, entry[1]) for index, entry in enumerate(entries) if entry}
     index, kind = header.get("DATA_TYPE", (0, "ACCELERATION"))
     if kind and "ACCELERATION" not in kind.upper():
@@ -64,7 +64,7 @@ def read(text: TextFile) -> Record:
     )
 
 
-def _entry(line: str) -> tuple[str, str] | None:
+def _split_entry(line: str) -> tuple[str, str] | None:
     """Return the key and the value of a line "KEY: value", or None for any other line."""
     key, colon, value = (part.strip() for part in line.partition(":"))
     return (key, value) if colon and _KEY.fullmatch(key) else None

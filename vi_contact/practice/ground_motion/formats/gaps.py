@@ -26,8 +26,7 @@ def refuse_fill_values(samples: Sequence[float] | Array, place: Callable[[int], 
     marks = np.array([_is_mark(value) for value in np.abs(values)], dtype=bool)
     if not np.any(marks):
         return
-    others = np.abs(values[~marks])
-    most = float(np.max(others, initial=0.0))
+    most = float(np.max(np.abs(values[~marks]), initial=0.0))
     jumps = np.abs(np.diff(values))
     beside_marks = marks[:-1] | marks[1:]
     usual_jump = float(np.max(jumps[~beside_marks], initial=0.0))

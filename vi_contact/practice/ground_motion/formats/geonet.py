@@ -77,19 +77,19 @@ def read(text: TextFile) -> Record:
 
     ``channel`` is 1 for the first of the file, or its name such as "S16W".
     """
-    parts = list(_parts(text))
+    parts = list(_find_parts(text))
     part = parts[text.choose([part.name for part in parts])]
-    values, lines = _samples(text, part)
+    values, lines = _read_samples(text, part)
 
     # Number of samples and step, which the header states more than once.
     header = range(part.start, part.start + TEXT_LINES)
-    count_line, count = _first(text, header, _POINTS, "Number of points")
+    count_line, count = _read_first(text, header, _POINTS, "Number of points")
     if count != part.counts[0]:
         raise InputError(
             f"{text.at(count_line)}: {count:g} points are announced but the integers of the "
             f"header say {part.counts[0]}; get the file again"
         )
-    step_line, step = _first(text, header, _STEP, "the interval of the samples")
+    step_line, step = _read_first(text, header, _STEP, "the interval of the samples")
     _check_step(text, part, (step_line, step), count)
 
     scale = _find_number(text, header, _SCALE)
@@ -123,7 +123,7 @@ def read(text: TextFile) -> Record:
     )
 
 
-def _parts(text: TextFile) -> Iterator[_Part]:
+def _find_parts(text: TextFile) -> Iterator[_Part]:
     """Yield the components of the file, which follow one another without a gap."""
     start = 0
     total = len(text.lines)
@@ -136,7 +136,7 @@ def _parts(text: TextFile) -> Iterator[_Part]:
                 f"{text.at(start)}: a component should begin here with 'Corrected accelerogram' or "
                 "'Uncorrected accelerogram'; lines were lost or added, get the complete file"
             )
-        integers = _fields(text, start + TEXT_LINES, INTEGER_LINES)
+        integers = _read_fields(text, start + TEXT_LINES, INTEGER_LINES)
         names = [match[1] for match in map(_COMPONENT.search, head) if match]
         counts = tuple(int(count) for count in integers[COUNTS])
         part = _Part(start, names[0] if names else "", counts)
@@ -150,7 +150,7 @@ def _parts(text: TextFile) -> Iterator[_Part]:
         start = part.end
 
 
-def _fields(text: TextFile, start: int, lines: int) -> list[float]:
+def _read_fields(text: TextFile, start: int, lines: int) -> list[float]:
     """Return the values of lines of ten fields."""
     values: list[float] = []
     for index in range(start, start + lines):
@@ -164,34 +164,42 @@ def _fields(text: TextFile, start: int, lines: int) -> list[float]:
     return values
 
 
-def _samples(text: TextFile, part: _Part) -> tuple[list[float], list[int]]:
+def _read_samples(text: TextFile, part: _Part) -> tuple[list[float], list[int]]:
     """Return the accelerations as they are written, and the index of the line of each."""
     values: list[float] = []
     lines: list[int] = []
     for index in range(part.data, part.data + -(-part.counts[0] // PER_LINE)):
         row = text.cut_fields(index, WIDTH)
-        wanted = min(PER_LINE, part.counts[0] - len(values))
-        if len(row) != wanted:
+        expected = min(PER_LINE, part.counts[0] - len(values))
+        if len(row) != expected:
             raise InputError(
-                f"{text.at(index)}: the row has {len(row)} values instead of {wanted}; a value is "
-                "missing or too many, get the complete file"
+                f"{text.at(index)}: the row has {len(row)} values instead of {expected}; a value "
+                "is missing or too many, get the complete file"
             )
         values += row
         lines += [index] * len(row)
     return values, lines
 
 
-def _first(text: TextFile, header: range, pattern: re.Pattern[str], what: str) -> tuple[int, float]:
+def _read_first(
+    text: TextFile, header: range, pattern: re.Pattern[str], quantity: str
+) -> tuple[int, float]:
     """Return the line and the number of the first match.
 
-    Raises InputError, which says what is missing, where there is none.
+    Raises InputError, which names the quantity that is missing, where there is none.
+
+    Args:
+        text: the file.
+        header: indices of the lines of the header.
+        pattern: with the number in a group.
+        quantity: that it states, in words for messages.
     """
     for index in header:
         match = pattern.search(text.heads[index])
         if match:
             return index, text.number(index, next(filter(None, match.groups())))
     raise InputError(
-        f"{text.at(header[0])}: the header does not give {what}; get the complete file"
+        f"{text.at(header[0])}: the header does not give {quantity}; get the complete file"
     )
 
 
@@ -205,8 +213,20 @@ def _find_number(text: TextFile, header: range, pattern: re.Pattern[str]) -> flo
 
 
 def _check_step(text: TextFile, part: _Part, step: Statement, count: float) -> None:
-    """Raise InputError unless the step agrees with the one among the reals, and the duration."""
-    _, seconds_of_step = step
+    """Raise InputError unless the step agrees with the one among the reals, and the duration.
+
+    Args:
+        text: the file.
+        part: the component.
+        step: line that states the step, and the step [s].
+        count: number of accelerations.
+    """
+    step_line, seconds_of_step = step
+    if seconds_of_step <= 0.0:
+        raise InputError(
+            f"{text.at(step_line)}: the interval of the samples is {seconds_of_step:g} s; get the "
+            "file again"
+        )
     index = part.start + TEXT_LINES + INTEGER_LINES + STEP // PER_LINE
     column = STEP % PER_LINE
     word = text.lines[index][WIDTH * column : WIDTH * (column + 1)].strip()

@@ -9,7 +9,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from ..record import known_units
+from ..record import recognise_units
 from .statements import TIME_UNITS
 from .text import TextFile
 
@@ -74,18 +74,18 @@ def column_heading(text: TextFile, header: Sequence[int], width: int) -> list[Co
     if width < 2 or not lines:
         return None
     last = lines[-1]
-    cells = _cells(text.heads[last], width)
+    cells = _split_cells(text.heads[last], width)
     if cells is None:
         return None
 
     # A line of units alone: the names stand above it.
     units = [cell.strip("()[] ") for cell in cells]
     if len(lines) > 1 and all(_kind_of_unit(unit) for unit in units):
-        names = _cells(text.heads[lines[-2]], width)
+        names = _split_cells(text.heads[lines[-2]], width)
         if names is not None:
             named = zip(names, units, strict=True)
-            return [_column(f"{name} [{unit}]", last) for name, unit in named]
-    columns = [_column(cell, last) for cell in cells]
+            return [_describe_column(f"{name} [{unit}]", last) for name, unit in named]
+    columns = [_describe_column(cell, last) for cell in cells]
 
     # Beside "t" small letters are quantities, and "V" is vertical.
     if any(column.name == "t" for column in columns):
@@ -101,7 +101,7 @@ def column_heading(text: TextFile, header: Sequence[int], width: int) -> list[Co
     return None
 
 
-def _cells(line: str, width: int) -> list[str] | None:
+def _split_cells(line: str, width: int) -> list[str] | None:
     """Return the cells of a line if it can be split into `width` of them."""
     line = line.strip().strip(_MARKS).rstrip(",;")
     for split in _SPLITS:
@@ -112,7 +112,7 @@ def _cells(line: str, width: int) -> list[str] | None:
     return None
 
 
-def _column(cell: str, line: int) -> Column:
+def _describe_column(cell: str, line: int) -> Column:
     """Return what one cell says: its name, its unit, and the kind that both tell."""
     name, unit = _split_cell(cell)
     by_unit = _kind_of_unit(unit) if unit else ""
@@ -138,7 +138,7 @@ def _split_cell(cell: str) -> tuple[str, str | None]:
 
 def _kind_of_unit(unit: str) -> str:
     """Return the kind of motion that a unit measures, or "" where it is unknown."""
-    if known_units(unit) is not None:
+    if recognise_units(unit) is not None:
         return "acceleration"
     word = "".join(unit.lower().split()).replace("sec", "s")
     if word in TIME_UNITS or unit.strip().lower() in TIME_UNITS:

@@ -57,11 +57,11 @@ def read(text: TextFile) -> Record:
         raise InputError(
             f"{text.path}: the header has no line {missing[0]!r}; get the complete file"
         )
-    scale, name = _scale(text, header["Scale Factor"])
-    frequency = _number(text, header["Sampling Freq(Hz)"], "Sampling Freq(Hz)")
+    scale, name = _read_scale(text, header["Scale Factor"])
+    frequency = _read_number(text, header["Sampling Freq(Hz)"], "Sampling Freq(Hz)")
     counts, _ = text.series(header["Memo."] + 1)
-    seconds = _number(text, header["Duration Time(s)"], "Duration Time(s)")
-    if not abs(len(counts) - seconds * frequency) <= 0.5:
+    seconds = _read_number(text, header["Duration Time(s)"], "Duration Time(s)")
+    if not counts or not abs(len(counts) - seconds * frequency) <= 0.5:
         raise InputError(
             f"{text.at(header['Duration Time(s)'])}: {seconds:g} s at {frequency:g} Hz are "
             f"announced but {len(counts)} samples follow; get the complete file"
@@ -69,9 +69,9 @@ def read(text: TextFile) -> Record:
     notes = [" ".join(line.split()) for line in text.heads[: header["Memo."]]]
     mean = np.mean(counts)
     notes.append(f"mean of {scale * mean:.6g} {name} removed")
-    time = _value(text, header["Origin Time"], "Origin Time")
-    station = _value(text, header["Station Code"], "Station Code")
-    direction = _value(text, header["Dir."], "Dir.")
+    time = _read_value(text, header["Origin Time"], "Origin Time")
+    station = _read_value(text, header["Station Code"], "Station Code")
+    direction = _read_value(text, header["Dir."], "Dir.")
     return text.record(
         np.array(counts) - mean,
         units=name,
@@ -86,12 +86,12 @@ def read(text: TextFile) -> Record:
     )
 
 
-def _value(text: TextFile, index: int, key: str) -> str:
+def _read_value(text: TextFile, index: int, key: str) -> str:
     """Return what follows a key on its line."""
     return text.heads[index][len(key) :].strip()
 
 
-def _scale(text: TextFile, index: int) -> tuple[float, str]:
+def _read_scale(text: TextFile, index: int) -> tuple[float, str]:
     """Return the size of a count, and its unit, of "Scale Factor      3920(gal)/6182761"."""
     match = _SCALE.search(text.heads[index])
     if match is None or text.number(index, match[3]) == 0.0:
@@ -103,9 +103,9 @@ def _scale(text: TextFile, index: int) -> tuple[float, str]:
     return size, canonical_units(text.at(index), match[2])
 
 
-def _number(text: TextFile, index: int, key: str) -> float:
+def _read_number(text: TextFile, index: int, key: str) -> float:
     """Return the positive number after a key, "Hz" allowed."""
-    match = _FREQUENCY.match(_value(text, index, key))
+    match = _FREQUENCY.match(_read_value(text, index, key))
     if match is None or text.number(index, match[1]) <= 0.0:
         raise InputError(f"{text.at(index)}: {key!r} has no positive number; get the file again")
     return text.number(index, match[1])

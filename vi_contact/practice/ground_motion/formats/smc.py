@@ -55,8 +55,8 @@ def read(text: TextFile) -> Record:
             f"{text.at(0)}: {kind!r} is not an acceleration; get the file of type "
             "'2 CORRECTED ACCELEROGRAM'"
         )
-    integers = _fields(text, TEXT_LINES, INTEGER_LINES, INTEGER_WIDTH, 8)
-    reals = _fields(text, TEXT_LINES + INTEGER_LINES, REAL_LINES, REAL_WIDTH, 5)
+    integers = _read_fields(text, TEXT_LINES, INTEGER_LINES, INTEGER_WIDTH, 8)
+    reals = _read_fields(text, TEXT_LINES + INTEGER_LINES, REAL_LINES, REAL_WIDTH, 5)
     comments_start = TEXT_LINES + INTEGER_LINES + REAL_LINES
     start = comments_start + int(integers[COMMENTS])
     comments = text.heads[comments_start:start]
@@ -68,7 +68,7 @@ def read(text: TextFile) -> Record:
         )
     rate = reals[SAMPLING_RATE]
     stated_step = 1.0 / rate if 0.0 < rate < UNDEFINED else None
-    direction = _direction(integers)
+    direction = _describe_direction(integers)
     notes = []
     if direction:
         notes.append(f"component: {direction}")
@@ -77,7 +77,7 @@ def read(text: TextFile) -> Record:
     notes += [line[1:].strip() for line in comments if line[1:].strip()]
     title_lines = [text.heads[index] for index in (3, 5) if text.heads[index].strip(" *")]
     title = "; ".join(" ".join(line.split()) for line in title_lines)
-    samples, lines = _samples(text, start, integers[SAMPLES])
+    samples, lines = _read_samples(text, start, integers[SAMPLES])
     return text.record(
         samples,
         lines=lines,
@@ -86,12 +86,12 @@ def read(text: TextFile) -> Record:
         format="USGS SMC",
         title=title,
         notes=tuple(notes),
-        station=_station(text),
+        station=_find_station(text),
         component=direction,
     )
 
 
-def _fields(text: TextFile, start: int, lines: int, width: int, per_line: int) -> list[float]:
+def _read_fields(text: TextFile, start: int, lines: int, width: int, per_line: int) -> list[float]:
     """Return the values on some lines of the header.
 
     Args:
@@ -113,7 +113,7 @@ def _fields(text: TextFile, start: int, lines: int, width: int, per_line: int) -
     return values
 
 
-def _samples(text: TextFile, start: int, count: float) -> tuple[list[float], list[int]]:
+def _read_samples(text: TextFile, start: int, count: float) -> tuple[list[float], list[int]]:
     """Return the samples in cm/s², and the index of the line of each."""
     lines = list(range(start, len(text.lines)))
     rows = [text.cut_fields(index, SAMPLE_WIDTH) for index in lines]
@@ -132,7 +132,7 @@ def _samples(text: TextFile, start: int, count: float) -> tuple[list[float], lis
     return values, line_of_value
 
 
-def _direction(integers: list[float]) -> str:
+def _describe_direction(integers: list[float]) -> str:
     """Return the component's direction in words."""
     if integers[VERTICAL] == 0.0:
         return "vertical, up"
@@ -144,7 +144,7 @@ def _direction(integers: list[float]) -> str:
     return f"azimuth {integers[AZIMUTH]:g} degrees clockwise from north"
 
 
-def _station(text: TextFile) -> str:
+def _find_station(text: TextFile) -> str:
     """Return what follows "station =" on text line 6, up to "component"."""
     match = _STATION.search(text.heads[5])
     name = match[1] if match else ""

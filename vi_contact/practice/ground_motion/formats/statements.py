@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable, Sequence
 
 from ....core.errors import InputError
-from ..record import UNITS, known_units
+from ..record import UNITS, recognise_units
 from .text import NUMBER, TextFile
 
 _SECONDS = rf"({NUMBER})\s*+-?s(?:ec(?:ond)?s?)?\b"
@@ -136,7 +136,7 @@ def find_units(text: TextFile, indices: Iterable[int]) -> list[tuple[int, str]]:
             continue
         units = set()
         for match in _UNIT.finditer(line):
-            known = known_units(match[0])
+            known = recognise_units(match[0])
             if known == "g" and not _BEFORE_G.search(line[: match.start()]):
                 continue
             if known is not None:
@@ -148,13 +148,13 @@ def find_units(text: TextFile, indices: Iterable[int]) -> list[tuple[int, str]]:
 
 
 def agree(
-    text: TextFile, what: str, statements: Sequence[Statement], *, rounding: float = 1e-6
+    text: TextFile, quantity: str, statements: Sequence[Statement], *, rounding: float = 1e-6
 ) -> Statement | None:
     """Return the first of several statements, or None where there is none.
 
     Args:
         text: the file.
-        what: is stated, for messages.
+        quantity: that is stated, in words for messages.
         statements: lines and numbers.
         rounding: relative difference that counts as none.
 
@@ -167,7 +167,7 @@ def agree(
     for index, value in statements[1:]:
         if abs(value - first) > rounding * abs(first):
             raise InputError(
-                f"{text.at(index)}: the header states {what} as {value:g}, but line "
+                f"{text.at(index)}: the header states {quantity} as {value:g}, but line "
                 f"{first_line + 1} states it as {first:g}; correct the file, or get it again"
             )
     return first_line, first
@@ -198,7 +198,7 @@ def find_unknown_units(text: TextFile, indices: Iterable[int]) -> tuple[int, str
             continue
         word = match[1].strip("()[] .:=")
         looks_like_unit = re.search(r"[/\^]|^counts?$|^[a-z]$", word, re.I)
-        if known_units(word) is None and word.lower() not in TIME_UNITS and looks_like_unit:
+        if recognise_units(word) is None and word.lower() not in TIME_UNITS and looks_like_unit:
             return index, match[1]
     return None
 

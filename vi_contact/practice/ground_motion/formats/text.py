@@ -93,7 +93,7 @@ class TextFile:
         counted: str = "counted, as the header says",
         dt_from: str = "header",
         dt_rounding: float = SAME_STEP,
-        **told: Any,
+        **fields: Any,
     ) -> Record:
         """Return the record of ``scale`` times samples.
 
@@ -108,7 +108,7 @@ class TextFile:
             counted: where the number of samples comes from.
             dt_from: where the time step comes from.
             dt_rounding: relative difference to the step of the caller that counts as rounding.
-            **told: title, notes, format, station, component and doubts of the record.
+            **fields: title, notes, format, station, component and doubts of the record.
 
         Raises:
             InputError: what the file and its caller leave open, or state differently.
@@ -128,7 +128,7 @@ class TextFile:
             samples_from=counted,
             units_from="option" if units is None else stated,
             dt_from="option" if dt is None else dt_from,
-            **told,
+            **fields,
         )
 
     def _agree_on_units(self, place: str, units: str | None) -> str:
@@ -136,8 +136,8 @@ class TextFile:
 
         Raises InputError where there are none, or both differ.
         """
-        given = [name for name in (units, self.units) if name is not None]
-        names = [canonical_units(place, name) for name in given]
+        spellings = [name for name in (units, self.units) if name is not None]
+        names = [canonical_units(place, name) for name in spellings]
         if not names:
             raise InputError(
                 f"{place}: the file does not state its units; pass units= as one of "
@@ -176,17 +176,17 @@ class TextFile:
         """
         if self.channel is None and len(components) == 1:
             return 0
-        wanted = self.channel
-        if isinstance(wanted, str):
-            folded = wanted.strip().casefold()
-            same = [k for k, name in enumerate(components) if name.casefold() == folded]
-            if len(same) == 1:
-                return same[0]
-            if wanted.strip().isdecimal() and len(wanted) < 9:
-                wanted = int(wanted)
+        channel = self.channel
+        if isinstance(channel, str):
+            folded = channel.strip().casefold()
+            places = [k for k, name in enumerate(components) if name.casefold() == folded]
+            if len(places) == 1:
+                return places[0]
+            if channel.strip().isdecimal() and len(channel) < 9:
+                channel = int(channel)
         numbers = range(1, len(components) + 1)
-        if isinstance(wanted, int) and not isinstance(wanted, bool) and wanted in numbers:
-            return wanted - 1
+        if isinstance(channel, int) and not isinstance(channel, bool) and channel in numbers:
+            return channel - 1
         names = ", ".join(f"{k}: {name or 'unnamed'}" for k, name in enumerate(components, 1))
         wrong = "" if self.channel is None else f"there is no channel {shown(self.channel)}: "
         count = "1 channel" if len(components) == 1 else f"{len(components)} channels"
@@ -266,7 +266,7 @@ class TextFile:
         """Raise InputError for a row that is shorter than others that are aligned.
 
         Nine of ten rows then have numbers that end at the same places, and a character was lost. A
-        longer row holds a number that is too wide for its columns.
+        longer row holds a number that is too wide for its columns, or more numbers than others.
         """
         if len(lines) < 5:
             return
@@ -277,8 +277,11 @@ class TextFile:
         ((usual, often),) = Counter(ends[:-1]).most_common(1)
         if len(usual) < 2 or often < 0.9 * (len(lines) - 1):
             return
-        for index, own in zip(lines, ends, strict=True):
-            if own != usual[: len(own)] and own[-1] < usual[len(own) - 1]:
+        for index, ends_of_row in zip(lines, ends, strict=True):
+            count = len(ends_of_row)
+            if not 0 < count <= len(usual):
+                continue
+            if ends_of_row[-1] < usual[count - 1]:
                 raise InputError(
                     f"{self.at(index)}: the row is shorter than the others, whose numbers end at "
                     "the same places, so that a character is missing; get the complete file"
@@ -349,9 +352,9 @@ class TextFile:
         """
         line = self.lines[index].rstrip()
         values = []
-        for left in range(offset, len(line), width):
-            field = line[left : left + width]
-            where = f" in columns {left + 1} to {left + width}"
+        for begin in range(offset, len(line), width):
+            field = line[begin : begin + width]
+            where = f" in columns {begin + 1} to {begin + width}"
             values.append(self.number(index, field.strip(), where))
             if len(field) < width or field[-1].isspace():
                 raise InputError(
@@ -485,10 +488,10 @@ def join_rows(
     return values, line_of_value
 
 
-def load_text(path: str | os.PathLike[str], **said: Any) -> TextFile:
+def load_text(path: str | os.PathLike[str], **options: Any) -> TextFile:
     """Read `path` as UTF-8 or, failing that, Latin-1; line ends may be any.
 
-    ``said`` is what the caller says about the file: the other fields of ``TextFile``.
+    ``options`` is what the caller says about the file: the other fields of ``TextFile``.
 
     Raises InputError where the file is missing, unreadable, empty, too large or not text.
     """
@@ -517,4 +520,5 @@ def load_text(path: str | os.PathLike[str], **said: Any) -> TextFile:
     except UnicodeDecodeError:
         text = data.decode("latin-1")
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    return TextFile(path=name, lines=tuple(lines), sha256=hashlib.sha256(data).hexdigest(), **said)
+    sha256 = hashlib.sha256(data).hexdigest()
+    return TextFile(path=name, lines=tuple(lines), sha256=sha256, **options)

@@ -22,7 +22,7 @@ def rises_evenly(times: Array, *, decimals: int | None = None) -> bool:
     usual = float(np.median(steps))
     if np.all(np.abs(steps - usual) <= SAME_STEP * usual):
         return True
-    return _is_rounded(times, _rounding(times, decimals))
+    return _is_rounded(times, _largest_rounding(times, decimals))
 
 
 def time_step(
@@ -61,9 +61,9 @@ def time_step(
     odd = np.abs(steps - usual) > SAME_STEP * usual
     if not np.any(odd):
         return (times[-1] - times[0]) / (times.size - 1), SAME_STEP, False
-    rounding = _rounding(times / unit, decimals) * unit
+    rounding = _largest_rounding(times / unit, decimals) * unit
     if _is_rounded(times, rounding):
-        step, error = _roundest_step(times, rounding)
+        step, error = _find_roundest_step(times, rounding)
         return step, error, False
     if text.resample_dt is None:
         k = int(np.argmax(odd)) + 1
@@ -71,9 +71,9 @@ def time_step(
             f"{text.at(lines[k])}: the step to time {times[k]:.9g} s is {steps[k - 1]:.9g} s, "
             f"others {usual:.9g} s; pass resample_dt= to interpolate, or correct the time"
         )
-    wanted = number("read_record", "resample_dt", text.resample_dt, positive=True, unit="seconds")
-    step = wanted / math.ceil(wanted / usual * (1.0 - SAME_STEP))
-    counted("read_record", f"resample_dt = {wanted!r} s", (times[-1] - times[0]) / step)
+    dt = number("read_record", "resample_dt", text.resample_dt, positive=True, unit="seconds")
+    step = dt / math.ceil(dt / usual * (1.0 - SAME_STEP))
+    counted("read_record", f"resample_dt = {dt!r} s", (times[-1] - times[0]) / step)
     return step, SAME_STEP, True
 
 
@@ -86,13 +86,13 @@ def interpolate(times: Array, samples: Array, step: float) -> Array:
         step: of the even times, from the first one on [s]. The last time is kept.
     """
     last = (times[-1] - times[0]) / step
-    rounding = 2.0 * float(_rounding(times, None)) / step
+    rounding = 2.0 * float(_largest_rounding(times, None)) / step
     count = int(last * (1.0 + 1e-12) + min(rounding, COARSE) + 1.0)
     even_times = times[0] + step * np.arange(count)
     return np.asarray(np.interp(even_times, times, samples))
 
 
-def _rounding(times: Array, decimals: int | None) -> float:
+def _largest_rounding(times: Array, decimals: int | None) -> float:
     """Return the largest error of times that are printed to `decimals` or had single precision."""
     # In single precision they were computed too: a start and a multiple of the step, each rounded
     # once.
@@ -115,7 +115,7 @@ def _is_rounded(times: Array, rounding: float) -> bool:
     return 2.0 * rounding <= COARSE * step and away <= 2.0 * rounding
 
 
-def _roundest_step(times: Array, rounding: float) -> tuple[float, float]:
+def _find_roundest_step(times: Array, rounding: float) -> tuple[float, float]:
     """Return the roundest step that the rounded times allow, and its relative error.
 
     It is the one with the fewest digits, or the whole sampling rate.

@@ -41,7 +41,7 @@ def read(text: TextFile) -> Record:
         if entry and entry[1].strip():
             key = " ".join(entry[1].split()).upper()
             header.setdefault(key, (index, entry[2].strip()))
-    form_line, form = _entry(text, header, "FORMATO DATOS")
+    form_line, form = _get_entry(text, header, "FORMATO DATOS")
     fields = _FORMAT.match(form)
     if fields is None:
         raise InputError(
@@ -50,7 +50,7 @@ def read(text: TextFile) -> Record:
         )
     channels = int(fields[1])
     width = int(fields[2])
-    _, directions = _entry(text, header, "ORIENTACION C1")
+    _, directions = _get_entry(text, header, "ORIENTACION C1")
     names = _split(directions)
     if len(names) != channels or width < 1:
         raise InputError(
@@ -58,7 +58,7 @@ def read(text: TextFile) -> Record:
             f"{len(names)} directions; get the file again"
         )
     place = text.choose(names)
-    data = _first_row(text, start)
+    data = _find_first_row(text, start)
     values: list[float] = []
     lines = text.find_filled(data)
     for index in lines:
@@ -69,11 +69,11 @@ def read(text: TextFile) -> Record:
                 "a value is missing or too many, get the complete file"
             )
         values.append(row[place])
-    count_line, counts = _entry(text, header, "NUM. TOTAL DE MUESTRAS, C1")
-    count = _number_of_channel(text, count_line, counts, place)
+    count_line, counts = _get_entry(text, header, "NUM. TOTAL DE MUESTRAS, C1")
+    count = _read_number(text, count_line, counts, place)
     text.refuse_other_count(count_line, count, len(values))
-    step_line, step = _step(text, header, place, count)
-    units_line, units = _entry(text, header, "UNIDADES DE LOS DATOS")
+    step_line, step = _read_step(text, header, place, count)
+    units_line, units = _get_entry(text, header, "UNIDADES DE LOS DATOS")
     _, station = header.get("CLAVE DE LA ESTACION", (0, ""))
     _, date = header.get("FECHA DEL SISMO [GMT]", (0, ""))
     _, hour = header.get("HORA EPICENTRO (GMT)", (0, ""))
@@ -94,7 +94,7 @@ def read(text: TextFile) -> Record:
     )
 
 
-def _entry(text: TextFile, header: dict[str, tuple[int, str]], start: str) -> tuple[int, str]:
+def _get_entry(text: TextFile, header: dict[str, tuple[int, str]], start: str) -> tuple[int, str]:
     """Return the line and the value of the entry whose key begins so.
 
     Raises InputError where it is missing or empty.
@@ -110,29 +110,42 @@ def _split(value: str) -> list[str]:
     return [part.strip() for part in value.strip().lstrip("/").split("/")]
 
 
-def _number_of_channel(text: TextFile, line: int, value: str, place: int) -> float:
-    """Return the number of one channel of "/200/200/200"."""
+def _read_number(text: TextFile, line: int, value: str, place: int) -> float:
+    """Return the number of one channel of "/200/200/200".
+
+    Args:
+        text: the file.
+        line: index of the line, for messages.
+        value: numbers of all channels, between slashes.
+        place: number of the channel, from 0.
+    """
     parts = _split(value)
     return text.number(line, parts[place] if place < len(parts) else "", " of the channel")
 
 
-def _step(
+def _read_step(
     text: TextFile, header: dict[str, tuple[int, str]], place: int, count: float
 ) -> tuple[int, float]:
     """Return the line of the time step, and the step [s].
 
     The sampling rate and the duration must confirm it.
+
+    Args:
+        text: the file.
+        header: its entries.
+        place: number of the channel, from 0.
+        count: number of samples.
     """
-    line, steps = _entry(text, header, "INTERVALO DE MUESTREO, C1")
-    step = _number_of_channel(text, line, steps, place)
+    line, steps = _get_entry(text, header, "INTERVALO DE MUESTREO, C1")
+    step = _read_number(text, line, steps, place)
     statements = [(line, step)]
-    rate_line, rates = _entry(text, header, "VEL. DE MUESTREO, C1")
-    rate = _number_of_channel(text, rate_line, rates, place)
+    rate_line, rates = _get_entry(text, header, "VEL. DE MUESTREO, C1")
+    rate = _read_number(text, rate_line, rates, place)
     if rate > 0.0:
         statements.append((rate_line, 1.0 / rate))
     agree(text, "the time step", statements, rounding=1e-3)
-    seconds_line, seconds = _entry(text, header, "DURACION DEL REGISTRO (S), C1")
-    duration = _number_of_channel(text, seconds_line, seconds, place)
+    seconds_line, seconds = _get_entry(text, header, "DURACION DEL REGISTRO (S), C1")
+    duration = _read_number(text, seconds_line, seconds, place)
     if not abs(duration - count * step) <= 1.01 * step + 0.01:
         raise InputError(
             f"{text.at(seconds_line)}: {duration:g} s are announced but {count:g} samples at "
@@ -141,7 +154,7 @@ def _step(
     return line, step
 
 
-def _first_row(text: TextFile, start: int) -> int:
+def _find_first_row(text: TextFile, start: int) -> int:
     """Return the index of the line after the second ruler, or after the line of directions."""
     near = range(start, min(start + 8, len(text.lines)))
     rulers = [k for k in near if text.heads[k].strip().startswith("-----")]

@@ -76,14 +76,14 @@ def read(text: TextFile) -> Record:
     ``channel`` is 1 for the first of the file, or its name such as "N00W". Where times are uneven,
     as digitisers of films gave them, resample_dt is needed.
     """
-    parts = _parts(text)
+    parts = _find_parts(text)
     part = parts[text.choose([part.name for part in parts])]
     line, count, seconds = _read_announcement(text, part)
     units_line, units = _find_units(text, part)
     rows = list(range(part.data, part.end))
-    width = _width(text, rows)
+    width = _find_width(text, rows)
     pairs = width == PAIR_WIDTH
-    values, lines = _fields(text, rows, width)
+    values, lines = _read_fields(text, rows, width)
     samples: Array = np.array(values[1::2] if pairs else values)
     text.refuse_other_count(line, count, samples.size)
     if pairs and len(values) % 2:
@@ -150,7 +150,7 @@ def _find_units(text: TextFile, part: _Part) -> tuple[int, str]:
     )
 
 
-def _parts(text: TextFile) -> list[_Part]:
+def _find_parts(text: TextFile) -> list[_Part]:
     """Return the components of the file."""
     starts = []
     for k, line in enumerate(text.heads):
@@ -209,13 +209,13 @@ def _read_announcement(text: TextFile, part: _Part) -> tuple[int, float, float]:
     )
 
 
-def _width(text: TextFile, rows: Sequence[int]) -> int:
+def _find_width(text: TextFile, rows: Sequence[int]) -> int:
     """Return the width of the columns, as the first row tells it."""
     row = text.lines[rows[0]].rstrip()
     return SINGLE_WIDTH if "E" in row.upper() else PAIR_WIDTH
 
 
-def _fields(text: TextFile, rows: Sequence[int], width: int) -> tuple[list[float], list[int]]:
+def _read_fields(text: TextFile, rows: Sequence[int], width: int) -> tuple[list[float], list[int]]:
     """Return all values by column, and the index of the line of each.
 
     Raises InputError where a row is not full, but for the last one.

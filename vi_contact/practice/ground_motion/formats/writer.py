@@ -21,7 +21,7 @@ def write_columns(record: Record, path: str | os.PathLike[str], units: str) -> N
         path: of the file.
         units: of the accelerations, a key of UNITS; times are in s.
     """
-    samples, name = _samples(record, units)
+    samples, name = _print_samples(record, units)
     comments = [
         record.title,
         f"time [s], acceleration [{name}], dt = {record.dt:.10g} s",
@@ -41,7 +41,7 @@ def write_at2(record: Record, path: str | os.PathLike[str], units: str = "g") ->
         path: of the file.
         units: of the accelerations, a key of UNITS.
     """
-    samples, name = _samples(record, units)
+    samples, name = _print_samples(record, units)
     header = [
         "PEER AT2 format, written by vi_contact",
         " ".join(record.title.split()) or "record",
@@ -62,11 +62,11 @@ def write_path_series(record: Record, path: str | os.PathLike[str], units: str) 
         path: of the file.
         units: of the accelerations, a key of UNITS.
     """
-    samples, _ = _samples(record, units)
+    samples, _ = _print_samples(record, units)
     _write(path, samples)
 
 
-def _samples(record: Record, units: str) -> tuple[list[str], str]:
+def _print_samples(record: Record, units: str) -> tuple[list[str], str]:
     """Return the accelerations in `units` as text, and the key of UNITS."""
     name = canonical_units("output units", units)
     values = record.acceleration / UNITS[name]
