@@ -75,7 +75,7 @@ def split_faces(contact: Geometry, sides: Indices) -> list[Face]:
     m = len(points)
     size = float(np.ptp(points, axis=0).max()) or 1.0
 
-    # Pieces: points that are number_parts by neighbours which point the same way.
+    # Pieces: points that are connected by neighbours which point the same way.
     near = cKDTree(points).query(points, k=min(NEIGHBOURS, m))[1].reshape(m, -1)
     alike = np.einsum("mki,mi->mk", normals[near], normals) > np.cos(FEATURE_ANGLE)
     rows = np.repeat(np.arange(m), alike.sum(axis=1))
