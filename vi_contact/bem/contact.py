@@ -32,7 +32,16 @@ from ..core.algebra import (
     SerialMatrix,
     max_abs,
 )
-from ..core.checks import array, at, flag, function, instance, integers, optional, provides
+from ..core.checks import (
+    array,
+    describe_point,
+    flag,
+    function,
+    instance,
+    integers,
+    optional,
+    provides,
+)
 from ..core.corners import FEATURE_ANGLE
 from ..core.errors import InputError
 from ..core.obstacles import Obstacle, Touching, admissible_gap, locate_obstacle
@@ -205,8 +214,8 @@ class BoundaryContact:
         if np.max(np.abs(directions - normals)) <= 1e-9:
             raise InputError(
                 f"BoundaryContact: the contact boundary turns by {np.degrees(turns[corner]):.3g} "
-                f"degrees at {at(points[corner])}: give conditions=conditions_on(mesh, compliance, "
-                "one side, other side), a condition on each"
+                f"degrees at {describe_point(points[corner])}: give conditions=conditions_on(mesh, "
+                "compliance, one side, other side), a condition on each"
             )
 
     @property

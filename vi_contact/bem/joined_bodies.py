@@ -30,7 +30,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve, lu_factor, lu_solve
 
 from ..core.algebra import Array, Indices, Mask, max_abs
-from ..core.checks import array, at, mask, optional, provides
+from ..core.checks import array, describe_point, mask, optional, provides
 from ..core.errors import InputError
 from ..core.protocols import FrictionLaw, Frictionless
 from ..core.surfaces import nodal_frames
@@ -258,8 +258,8 @@ def match_points(points: Array, others: Array) -> Indices:
     worst = int(away.argmax())
     if len(points) != len(others) or away[worst] > MATCH * np.ptp(points, axis=0).max():
         raise InputError(
-            f"TwoBodies: the node at {at(points[worst])} has no partner on the other body; give "
-            "both interfaces the same nodes"
+            f"TwoBodies: the node at {describe_point(points[worst])} has no partner on the other "
+            "body; give both interfaces the same nodes"
         )
     return nearest
 

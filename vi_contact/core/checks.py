@@ -357,7 +357,7 @@ def path(owner: str, meaning: str, value: Any) -> Path:
     return Path(value)
 
 
-def place_in_words(point: Array) -> str:
+def describe_point(point: Array) -> str:
     """Return a point, or a direction, as words for a sentence: (1, 0.5)."""
     return f"({', '.join(f'{x:g}' for x in point)})"
 
@@ -453,6 +453,3 @@ def on_all(comm: Comm, name: str, call: Callable[[], T]) -> T:
         # Whoever prints it sees what it came from, such as a lack of memory.
         raise error from failure
     return results[0]
-
-
-at = place_in_words  # the name by which other rooms still call it

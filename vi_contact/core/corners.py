@@ -10,7 +10,7 @@ from itertools import chain, permutations
 import numpy as np
 
 from .algebra import Array, Indices, from_each
-from .checks import place_in_words
+from .checks import describe_point
 from .errors import InputError
 from .surfaces import (
     ContactSurface,
@@ -103,7 +103,7 @@ def refuse_rubbing(surface: ContactSurface) -> None:
     if corners:
         _, point = min(corners, key=lambda corner: corner[0])
         raise InputError(
-            f"{len(corners)} contact nodes, the first at {place_in_words(point)}, have several "
+            f"{len(corners)} contact nodes, the first at {describe_point(point)}, have several "
             "contact directions, and friction on two faces at once is not modelled: let them slide "
             "freely (surface.with_frictionless_corners()), or treat the corner as smooth (a larger "
             "feature_angle=)"

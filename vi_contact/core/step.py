@@ -32,7 +32,7 @@ import numpy as np
 
 from .algebra import Array, EffectiveMatrix, Mask
 from .certificate import Certificate
-from .checks import on_all, place_in_words, shown
+from .checks import describe_point, on_all, shown
 from .errors import InputError, ViContactError
 from .problem import ContactProblem
 from .protocols import FrictionLaw, Frictionless, MassLaw
@@ -183,7 +183,7 @@ def refuse_limits(law: FrictionLaw, surface: ContactSurface, scale: float, t: fl
             first = wrong[0]
             raise InputError(
                 f"{owner}: {name} is {values[first]:g} at "
-                f"{place_in_words(surface.points[first])} and t = {t:g} s; a friction limit is "
+                f"{describe_point(surface.points[first])} and t = {t:g} s; a friction limit is "
                 "zero or a positive finite number"
             )
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..core.algebra import from_each, max_abs
-from ..core.checks import at, provides, real, several, shown
+from ..core.checks import describe_point, provides, real, several, shown
 from ..core.collective import Parts, agree, together
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
@@ -214,6 +214,6 @@ def check_state(
     if inside > SLACK * tolerance * max(sizes):
         worst = np.concatenate(from_each(surface.comm, surface.points[gap == -inside]))[0]
         raise InputError(
-            f"{owner}: the state is {inside:.3g} m inside the obstacle at {at(worst)}: give a "
-            "state with every gap >= 0"
+            f"{owner}: the state is {inside:.3g} m inside the obstacle at {describe_point(worst)}: "
+            "give a state with every gap >= 0"
         )

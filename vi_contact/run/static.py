@@ -21,7 +21,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.algebra import EffectiveMatrix, largest, max_abs
-from ..core.checks import at, number, real, shown
+from ..core.checks import describe_point, number, real, shown
 from ..core.collective import Parts, agree, together
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
@@ -101,7 +101,7 @@ def _warn_if_open(problem: ContactProblem, state: State) -> None:
             "a softer side 2, which should be meshed as finely or be side 1",
             state.t,
             100.0 * lost / area,
-            at(place),
+            describe_point(place),
         )
 
 

@@ -8,7 +8,7 @@ import ufl
 from ufl.algorithms import expand_derivatives
 
 from ..core.algebra import Array, Mask, largest, max_abs, total
-from ..core.checks import at, refuse, shown
+from ..core.checks import describe_point, refuse, shown
 from ..core.errors import InputError
 from ..fem import compat
 from ..fem.body.form_checks import refuse_not_linear
@@ -323,7 +323,8 @@ class Problem:
 
         def describe(i: int, words: str) -> str:
             node, component = divmod(i, space.dofmap.index_map_bs)
-            where = f"component {component} at {at(space.tabulate_dof_coordinates()[node])}"
+            place = describe_point(space.tabulate_dof_coordinates()[node])
+            where = f"component {component} at {place}"
             return f"vi.solve: {where}, where u is {u[i]:g} in [{low[i]:g}, {high[i]:g}]: {words}"
 
         refuse(

@@ -17,7 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, Mask, Matrix, largest
-from ...core.checks import at
+from ...core.checks import describe_point
 from ...core.corners import PARALLEL, are_orthogonal, corner_frame
 from ...core.errors import InputError
 from ...core.surfaces import (
@@ -145,14 +145,15 @@ class NodalFrames:
     def _refuse_prescribed(self, held: Mask) -> None:
         for slot in np.flatnonzero(np.any(held & (self.directions != 0.0), axis=1)):
             raise InputError(
-                f"contact node {at(self.points[slot])} is also prescribed along its contact "
-                "direction: free that component or leave the node out of the contact surface"
+                f"contact node {describe_point(self.points[slot])} is also prescribed along its "
+                "contact direction: free that component or leave the node out of the contact "
+                "surface"
             )
 
     def _refuse_dependent(self, slots: Indices) -> None:
         directions = self.directions[slots]
         k, d = directions.shape
-        where = f"contact node {at(self.points[slots[0]])}"
+        where = f"contact node {describe_point(self.points[slots[0]])}"
         cosines = (directions @ directions.T)[np.triu_indices(k, 1)]
         if np.any(cosines > 1.0 - PARALLEL):
             raise InputError(
@@ -375,7 +376,7 @@ def _refuse_chains(space: NodalSpace, parts: Sequence[NodalConditions]) -> None:
             space.at_nodes(space.leaders(facing.nodes.numbers), first)[:, 0] * space.comm.max(used)
         )
         if len(both):
-            where = f"node {at(facing.nodes.points[both[0]])}"
+            where = f"node {describe_point(facing.nodes.points[both[0]])}"
             if space.hierarchy is not None:
                 raise InputError(
                     f"{where} of P2 tetrahedra is on side 2 of a contact pair and of another "

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array, Indices, Mask
-from ...core.checks import at
+from ...core.checks import describe_point
 from ...core.errors import InputError
 from ...core.surfaces import nodal_frames
 from ...meshes.rows import connected
@@ -79,8 +79,8 @@ def facets_of(side: Side, sense: int) -> Facets:
     reach = np.linalg.norm(spokes, axis=2).max(axis=1)
     for bad in np.flatnonzero((turns(seen) <= SLIVER * reach[:, None] ** 2).any(axis=1)):
         raise InputError(
-            f"a facet of '{side.name}' at {at(middles[bad])} is a sliver or not convex: its normal "
-            "cannot be trusted, so mesh this boundary again"
+            f"a facet of '{side.name}' at {describe_point(middles[bad])} is a sliver or not "
+            "convex: its normal cannot be trusted, so mesh this boundary again"
         )
     return Facets(nodes[:, ::sense], corners[:, ::sense], middles, normals, reach)
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core.algebra import Array, largest
 from ...core.arguments import checked
-from ...core.checks import at, refuse
+from ...core.checks import describe_point, refuse
 from ...core.errors import InputError
 from ...core.quantities import RATIO, Positive, Remedy
 from ...fem import compat
@@ -135,7 +135,7 @@ def strain_compatible(
     for cells, own_curves in pairs:
         if len(cells):
             worst = cells[strain[cells].argmax()]
-            faults.append(own_curves.beyond(strain[worst], f"at {at(middles[worst])}"))
+            faults.append(own_curves.beyond(strain[worst], f"at {describe_point(middles[worst])}"))
     refuse(faults, comm)
     return StrainCompatible(solution, body, effective, changes)
 
