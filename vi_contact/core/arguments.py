@@ -19,7 +19,7 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from .checks import real, shape_of, shown, suggest_object
+from .checks import quote, real, shape_of, suggest_object
 from .errors import InputError
 from .quantities import Between, Quantity, quantities
 
@@ -93,7 +93,7 @@ def check(owner: str, meaning: str, value: Any, kind: Any) -> None:
         kind: the type, as annotations have it.
     """
     if not fits(value, kind):
-        raise InputError(f"{owner}: {meaning} is {shown(value)}; give {words(kind)}")
+        raise InputError(f"{owner}: {meaning} is {quote(value)}; give {words(kind)}")
 
 
 def _check(owner: str, name: str, value: Any, quantity: Quantity) -> None:
@@ -118,7 +118,7 @@ def _check(owner: str, name: str, value: Any, quantity: Quantity) -> None:
             remedy = f"{suggest_object(value)}{quantity.other.text}"
         elif limit is not None and limit.remedy:
             remedy = limit.remedy
-        raise InputError(f"{owner}: {quantity.named(name)} is {shown(value)}; {remedy}")
+        raise InputError(f"{owner}: {quantity.named(name)} is {quote(value)}; {remedy}")
     if limit is None or (value is None and type(None) in _members(kind)):
         return
 
@@ -128,7 +128,7 @@ def _check(owner: str, name: str, value: Any, quantity: Quantity) -> None:
     else:
         place, wrong = _locate_beyond(value, limit)
     if place is not None:
-        defect = f"{quantity.named(name)}{place} is {shown(wrong)}"
+        defect = f"{quantity.named(name)}{place} is {quote(wrong)}"
         raise InputError(f"{owner}: {defect}; {quantity.remedy(number_kind is int)}")
 
 

@@ -59,7 +59,7 @@ def number(
     result = real(value)
     too_low = (positive and result <= 0.0) or (not_negative and result < 0.0)
     if too_low or not math.isfinite(result):
-        raise InputError(f"{owner}: {meaning} is {shown(value)}; give {wanted}")
+        raise InputError(f"{owner}: {meaning} is {quote(value)}; give {wanted}")
     return result
 
 
@@ -81,7 +81,7 @@ def whole(owner: str, meaning: str, value: Any, *, least: int = 0, most: int | N
     if not math.isfinite(result) or result != int(result) or not least <= result <= upper:
         limit = "" if most is None else f" and at most {most}"
         raise InputError(
-            f"{owner}: {meaning} is {shown(value)}; give a whole number of at least {least}{limit}"
+            f"{owner}: {meaning} is {quote(value)}; give a whole number of at least {least}{limit}"
         )
     return int(value)
 
@@ -95,7 +95,7 @@ def check_word(name: str, given: object, known: Sequence[str]) -> None:
         known: the words to choose from.
     """
     if not isinstance(given, str) or given not in known:  # an array compares element by element
-        raise InputError(f"unknown {name} {shown(str(given))}: choose one of {', '.join(known)}")
+        raise InputError(f"unknown {name} {quote(str(given))}: choose one of {', '.join(known)}")
 
 
 def counted(
@@ -135,7 +135,7 @@ def flag(owner: str, meaning: str, value: Any) -> bool:
     """
     if isinstance(value, bool | np.bool_):
         return bool(value)
-    raise InputError(f"{owner}: {meaning} is {shown(value)}; give True or False")
+    raise InputError(f"{owner}: {meaning} is {quote(value)}; give True or False")
 
 
 def function(owner: str, meaning: str, value: Any, remedy: str) -> Any:
@@ -152,7 +152,7 @@ def function(owner: str, meaning: str, value: Any, remedy: str) -> Any:
     """
     if callable(value) and not isinstance(value, type):
         return value
-    raise InputError(f"{owner}: {meaning} is {shown(value)}; {suggest_object(value)}{remedy}")
+    raise InputError(f"{owner}: {meaning} is {quote(value)}; {suggest_object(value)}{remedy}")
 
 
 def column_name(kind: str, name: Any) -> str:
@@ -164,7 +164,7 @@ def column_name(kind: str, name: Any) -> str:
     if isinstance(name, str | int) and re.fullmatch(r"\w+", str(name), re.ASCII):
         return str(name)
     raise InputError(
-        f"{kind} {shown(name)}: use letters, digits and underscores for names of columns"
+        f"{kind} {quote(name)}: use letters, digits and underscores for names of columns"
     )
 
 
@@ -182,7 +182,7 @@ def several(owner: str, meaning: str, value: Any, remedy: str) -> tuple[Any, ...
     """
     if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes):
         return tuple(value)
-    raise InputError(f"{owner}: {meaning} is {shown(value)}; {suggest_object(value)}{remedy}")
+    raise InputError(f"{owner}: {meaning} is {quote(value)}; {suggest_object(value)}{remedy}")
 
 
 def instance(
@@ -202,7 +202,7 @@ def instance(
     """
     if isinstance(value, kinds):
         return value
-    raise InputError(f"{owner}: {meaning} is {shown(value)}; {suggest_object(value)}{remedy}")
+    raise InputError(f"{owner}: {meaning} is {quote(value)}; {suggest_object(value)}{remedy}")
 
 
 def provides(
@@ -231,7 +231,7 @@ def provides(
     has_other = any(hasattr(value, name) for name in lacks)
     if has_all and not has_other and not isinstance(value, type):
         return value
-    raise InputError(f"{owner}: {meaning} is {shown(value)}; {suggest_object(value)}{remedy}")
+    raise InputError(f"{owner}: {meaning} is {quote(value)}; {suggest_object(value)}{remedy}")
 
 
 def array(
@@ -259,7 +259,7 @@ def array(
         values = raw.astype(float)
     except (TypeError, ValueError):
         raise InputError(
-            f"{owner}: {meaning} is {shown(value)}; give real numbers of shape {wanted}{unit}"
+            f"{owner}: {meaning} is {quote(value)}; give real numbers of shape {wanted}{unit}"
         ) from None
     if values.ndim != len(shape) or any(
         n is not None and n != m for n, m in zip(shape, values.shape, strict=True)
@@ -315,7 +315,7 @@ def integers(owner: str, meaning: str, value: Any, shape: tuple[int | None, ...]
     """
     values = array(owner, meaning, value, shape)
     if np.any(values != np.rint(values)) or np.any(np.abs(values) > LARGEST_WHOLE):
-        raise InputError(f"{owner}: {meaning} is {shown(value)}; give whole numbers")
+        raise InputError(f"{owner}: {meaning} is {quote(value)}; give whole numbers")
     return values.astype(np.int64)
 
 
@@ -337,7 +337,7 @@ def mask(owner: str, meaning: str, value: Any, shape: tuple[int, ...]) -> Mask:
         values = np.empty(0)
     if values.dtype == bool and values.shape == shape:
         return values
-    defect = f"has shape {values.shape}" if values.dtype == bool else f"is {shown(value)}"
+    defect = f"has shape {values.shape}" if values.dtype == bool else f"is {quote(value)}"
     raise InputError(f"{owner}: {meaning} {defect}; give a boolean mask of shape {shape}")
 
 
@@ -353,7 +353,7 @@ def path(owner: str, meaning: str, value: Any) -> Path:
         InputError: what is no path, and an empty one.
     """
     if not isinstance(value, str | Path) or not str(value).strip() or "\0" in str(value):
-        raise InputError(f"{owner}: {meaning} is {shown(value)}; give the path of a file")
+        raise InputError(f"{owner}: {meaning} is {quote(value)}; give the path of a file")
     return Path(value)
 
 
@@ -362,7 +362,7 @@ def describe_point(point: Array) -> str:
     return f"({', '.join(f'{x:g}' for x in point)})"
 
 
-def shown(value: Any) -> str:
+def quote(value: Any) -> str:
     """Return the value for a sentence: short, on one line, also where its own repr fails."""
     if isinstance(value, type):
         return f"the class {value.__name__}"

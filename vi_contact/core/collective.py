@@ -23,7 +23,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from .algebra import Comm, from_each, largest
-from .checks import explain_error, shown
+from .checks import explain_error, quote
 from .errors import InputError, StepFailure, ViContactError
 
 T = TypeVar("T")
@@ -217,7 +217,7 @@ def agree(comm: Comm, owner: str, given: Mapping[str, Any]) -> None:
     for place, (name, digest) in enumerate(digests[0]):
         others = [rank for rank, theirs in enumerate(digests) if theirs[place] != (name, digest)]
         if others:
-            values = from_each(comm, shown(given[name]))
+            values = from_each(comm, quote(given[name]))
             apart = "is not the same on rank 0 and"
             if values[others[0]] != values[0]:
                 apart = f"is {values[0]} on rank 0 and {values[others[0]]}"

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .algebra import Array
-from .checks import array, instance, optional, provides, refuse, shown
+from .checks import array, instance, optional, provides, quote, refuse
 from .collective import Parts, agree
 from .corners import refuse_rubbing
 from .errors import InputError
@@ -62,11 +62,11 @@ class ContactProblem:
             f"ContactProblem with {self.surface.total} contact conditions",
             str(self.system),
             str(self.surface),
-            f"friction: {shown(self.friction)}",
-            f"impact: {shown(self.impact)}",
-            f"mass: {shown(self.mass or 'that of the time scheme')}",
+            f"friction: {quote(self.friction)}",
+            f"impact: {quote(self.impact)}",
+            f"mass: {quote(self.mass or 'that of the time scheme')}",
         ]
-        lines += [f"excitation: {shown(excitation)}" for excitation in self.excitations]
+        lines += [f"excitation: {quote(excitation)}" for excitation in self.excitations]
         return "\n  ".join(lines)
 
     @cached_property
@@ -253,7 +253,7 @@ def _refuse_repeated(excitations: Sequence[Any]) -> None:
     for first, second in combinations(excitations, 2):
         if first is second:
             raise InputError(
-                f"ContactProblem: excitation names {shown(first)} twice, which would shake twice: "
+                f"ContactProblem: excitation names {quote(first)} twice, which would shake twice: "
                 "leave it out once, or scale it"
             )
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from .algebra import max_abs
-from .checks import instance, number, refuse, shown, whole
+from .checks import instance, number, quote, refuse, whole
 from .errors import InputError
 from .problem import ContactProblem
 from .step import State
@@ -70,7 +70,7 @@ def _find_defects_of_state(problem: ContactProblem, state: State) -> Iterator[st
         kinds = "b" if name == "active" else "iuf"
         if value.dtype.kind not in kinds or not np.all(np.isfinite(value)):
             wanted = "True or False" if name == "active" else "finite real numbers"
-            yield f"{name} of the state is {shown(value)}: give {wanted}"
+            yield f"{name} of the state is {quote(value)}: give {wanted}"
 
 
 def initial_state(problem: ContactProblem, t: float = 0.0) -> State:

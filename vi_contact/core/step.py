@@ -32,7 +32,7 @@ import numpy as np
 
 from .algebra import Array, EffectiveMatrix, Mask
 from .certificate import Certificate
-from .checks import describe_point, on_all, shown
+from .checks import describe_point, on_all, quote
 from .errors import InputError, ViContactError
 from .problem import ContactProblem
 from .protocols import FrictionLaw, Frictionless, MassLaw
@@ -175,7 +175,7 @@ def refuse_limits(law: FrictionLaw, surface: ContactSurface, scale: float, t: fl
         values = np.asarray(part)
         if values.dtype.kind not in "iuf" or values.shape != (surface.count,):
             raise InputError(
-                f"{owner}: {name} is {shown(part)} at t = {t:g} s; return "
+                f"{owner}: {name} is {quote(part)} at t = {t:g} s; return "
                 f"{surface.count} real numbers, one for each contact condition"
             )
         wrong = np.flatnonzero(~((values >= 0.0) & (values < np.inf)))

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from .algebra import Array, Comm, Indices, Mask, Matrix, SerialComm, largest, on_first, total
 from .arguments import checked
 from .census import Census
-from .checks import function, shown
+from .checks import function, quote
 from .collective import call_user
 from .errors import InputError
 from .products import freeze
@@ -379,7 +379,7 @@ def _spread_motion(owner: str, value: Any, shape: tuple[int, ...]) -> Array:
     fits = metres.ndim <= len(shape) and all(n in (1, m) for n, m in pairs)
     if not fits or metres.dtype.kind not in "iuf" or not np.all(np.isfinite(metres)):
         raise InputError(
-            f"{owner} is {shown(value)}; return finite metres, one number or an array of shape "
+            f"{owner} is {quote(value)}; return finite metres, one number or an array of shape "
             f"{shape}"
         )
     return np.broadcast_to(metres.astype(float), shape)

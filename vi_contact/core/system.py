@@ -7,7 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from .algebra import Algebra, Array, EffectiveMatrix, Mask, Matrix
-from .checks import array, function, instance, provides, several, shown
+from .checks import array, function, instance, provides, quote, several
 from .collective import keep_error
 from .errors import InputError
 from .products import Remembered
@@ -174,7 +174,7 @@ def history_value(history: Callable[[float], float], t: float) -> float:
     if isinstance(value, float):
         return value
     if np.ndim(value) or np.asarray(value).dtype.kind not in "iuf":
-        what = f"the history of a load or excitation is {shown(value)} at t = {t:g} s"
+        what = f"the history of a load or excitation is {quote(value)} at t = {t:g} s"
         return keep_error(what, InputError(f"{what}: return one real number"), 0.0)
     return value
 
@@ -258,7 +258,7 @@ class SemiDiscreteSystem:
             is_array = isinstance(value, np.ndarray) and value.ndim == axes
             if not is_array or value.dtype.kind not in "iuf":
                 raise InputError(
-                    f"{owner}: {name} is {shown(value)}; give real numbers along {axes} axes"
+                    f"{owner}: {name} is {quote(value)}; give real numbers along {axes} axes"
                 )
 
     def __repr__(self) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from vi_contact.core.algebra import Array
-from vi_contact.core.checks import describe_point, shown
+from vi_contact.core.checks import describe_point, quote
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.extract import MeshArrays, Source, add_arrays, arrays_of
 from vi_contact.meshes.rows import Mask, Rows, cell_sides, connected, number_alike, vertex_count
@@ -236,7 +236,7 @@ def _joint(
     names = tuple(between) if not isinstance(between, str) else ()
     if len(names) != 2 or names[0] == names[1]:
         raise InputError(
-            f"CutOpen: between is {shown(between)}; give the names of two groups of cells"
+            f"CutOpen: between is {quote(between)}; give the names of two groups of cells"
         )
     if inside is not None or towards is not None:
         raise InputError(

@@ -17,7 +17,7 @@ from pathlib import Path
 from stat import S_ISREG
 from typing import NamedTuple
 
-from vi_contact.core.checks import shown
+from vi_contact.core.checks import quote
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.geo_words import (
     FIELD_OPTIONS,
@@ -115,7 +115,7 @@ def _read(path: Path) -> str:
         text = data.decode("utf-8-sig")
     except (OSError, ValueError) as error:
         raise InputError(
-            f"Gmsh script {shown(str(path))} cannot be read ({error}): check the path"
+            f"Gmsh script {quote(str(path))} cannot be read ({error}): check the path"
         ) from None
     if len(data) > LARGEST:
         raise InputError(f"{path}: the script has more than {LARGEST} bytes: mesh it yourself")
@@ -397,7 +397,7 @@ def _sentence(refused: Sequence[tuple[Token, bool]]) -> str:
     parts = []
     if others:
         some = others[:MOST_PLACES]
-        places = ", ".join(f"line {token.line} has {shown(token.word)}" for token in some)
+        places = ", ".join(f"line {token.line} has {quote(token.word)}" for token in some)
         rest = len(others) - MOST_PLACES
         more = f", and {rest} more" if rest > 0 else ""
         them = "them" if len(others) > 1 else "it"

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..core.algebra import Array, Mask, total
-from ..core.checks import shown
+from ..core.checks import quote
 from ..core.problem import ContactProblem
 from ..core.state_checks import check_problem_given
 from ..core.system import SemiDiscreteSystem
@@ -153,7 +153,7 @@ def _sources(system: SemiDiscreteSystem) -> Iterator[str]:
     if isinstance(forms.damping, DampingRatio):
         yield f"{_ratios(forms)} at {_frequencies(forms.damping)}"
     elif not isinstance(forms.damping, NoDamping):
-        yield shown(forms.damping)
+        yield quote(forms.damping)
     if forms.own_damping:
         yield "a damping form of its own"
     boundaries = [f"{type(one).__name__} on '{one.facets.name}'" for one in forms.boundaries]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..core.algebra import from_each, max_abs
-from ..core.checks import describe_point, provides, real, several, shown
+from ..core.checks import describe_point, provides, quote, real, several
 from ..core.collective import Parts, agree, together
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
@@ -178,7 +178,7 @@ def check_methods(owner: str, solver: Any, escalation: Any, tolerance: Any) -> N
         check_solver(owner, other, "a solver of escalation")
     if not 0.0 < real(tolerance) <= 1.0:
         raise InputError(
-            f"{owner}: tolerance is {shown(tolerance)}; give a relative residual above 0, such as "
+            f"{owner}: tolerance is {quote(tolerance)}; give a relative residual above 0, such as "
             "1e-9"
         )
 

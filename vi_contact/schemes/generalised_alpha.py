@@ -36,7 +36,7 @@ import numpy as np
 
 from ..core.algebra import Array, EffectiveMatrix
 from ..core.arguments import checked
-from ..core.checks import real, shown
+from ..core.checks import quote, real
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.quantities import Between
@@ -204,7 +204,7 @@ class GeneralisedAlpha(AlphaStep):
         stable = alpha_m <= alpha_f + SLACK and alpha_f <= 0.5 + SLACK and gamma >= least - SLACK
         stable = stable and np.inf > beta >= 0.5 * gamma - SLACK
         if not stable or not np.isfinite(least + gamma):
-            weights = ", ".join(f"{name}={shown(value)}" for name, value in vars(self).items())
+            weights = ", ".join(f"{name}={quote(value)}" for name, value in vars(self).items())
             raise InputError(
                 f"{weights} are not unconditionally stable, and contact has no highest frequency "
                 "to choose dt by: give alpha_m <= alpha_f <= 1/2, gamma >= 1/2 - alpha_m + "

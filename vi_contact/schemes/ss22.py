@@ -19,7 +19,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..core.algebra import EffectiveMatrix
-from ..core.checks import real, shown
+from ..core.checks import quote, real
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.step import Balance, State, StepProblem, StepResult
@@ -45,7 +45,7 @@ class SS22(SingleStep):
     def __post_init__(self) -> None:
         if not np.inf > real(self.theta2) >= real(self.theta1) >= 0.5:
             raise InputError(
-                f"SS22 weights theta1={shown(self.theta1)}, theta2={shown(self.theta2)}: give "
+                f"SS22 weights theta1={quote(self.theta1)}, theta2={quote(self.theta2)}: give "
                 "theta2 >= theta1 >= 0.5, the unconditionally stable range"
             )
 

@@ -8,7 +8,7 @@ import ufl
 from ufl.algorithms import expand_derivatives
 
 from ..core.algebra import Array, Mask, largest, max_abs, total
-from ..core.checks import describe_point, refuse, shown
+from ..core.checks import describe_point, quote, refuse
 from ..core.errors import InputError
 from ..fem import compat
 from ..fem.body.form_checks import refuse_not_linear
@@ -50,7 +50,7 @@ def split(form: Any, u: Any, J: Any) -> tuple[Any, Any]:
         check_form("J", jacobian, 2, u)
         return form, jacobian
     if not isinstance(form, tuple | list) or len(form) != 2 or J is not None:
-        raise refused(f"the form is {shown(form)}, J {shown(J)}; {FORMS}, whose Jacobian is a")
+        raise refused(f"the form is {quote(form)}, J {quote(J)}; {FORMS}, whose Jacobian is a")
     a, L = form
     check_form("a", a, 2, u)
     check_form("L", L, 1, u)
@@ -71,7 +71,7 @@ def derivatives(energy: Any, u: Any) -> tuple[Any, Any]:
         what = (
             f"a form of rank {len(energy.arguments())}"
             if isinstance(energy, ufl.Form)
-            else shown(energy)
+            else quote(energy)
         )
         raise refused(
             f"energy is {what}, and a functional is needed; give a UFL form of rank 0, such as "
@@ -94,7 +94,7 @@ def check_form(name: str, form: Any, rank: int, u: Any) -> None:
     """
     if not isinstance(form, ufl.Form) or len(form.arguments()) != rank:
         what = (
-            f"a form of rank {len(form.arguments())}" if isinstance(form, ufl.Form) else shown(form)
+            f"a form of rank {len(form.arguments())}" if isinstance(form, ufl.Form) else quote(form)
         )
         raise refused(f"{name} is {what}, and a {KINDS[rank]} is needed; {FORMS}")
     space = u.ufl_function_space()
@@ -362,7 +362,7 @@ class Problem:
             return np.tile(np.broadcast_to(number, (width,)), self.owned // width)
         except (TypeError, ValueError):
             raise refused(
-                f"{name} is {shown(given)}; give a Function on u.function_space itself, a number "
+                f"{name} is {quote(given)}; give a Function on u.function_space itself, a number "
                 f"(or {width}, one for a component), or None"
             ) from None
 

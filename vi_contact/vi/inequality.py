@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..core.certificate import Certificate
-from ..core.checks import instance, shown, whole
+from ..core.checks import instance, quote, whole
 from ..core.collective import agree
 from ..core.errors import StepFailure
 from ..fem import compat
@@ -224,7 +224,7 @@ def refuse_choices(form: Any, energy: Any, J: Any, method: Any) -> None:
         raise refused("J is given beside energy=, whose second derivative is J: leave J out")
     if energy is not None and method is not None:
         raise refused(
-            f"method is {shown(method)}, which solves the linear steps of a form; leave it "
+            f"method is {quote(method)}, which solves the linear steps of a form; leave it "
             "out with energy="
         )
 

@@ -21,7 +21,7 @@ import ufl
 from petsc4py import PETSc
 
 from ...core.algebra import Array, Indices
-from ...core.checks import flag, instance, number, optional, refuse, shown
+from ...core.checks import flag, instance, number, optional, quote, refuse
 from ...core.errors import InputError, of_machine
 from ...core.files import FIELDS, FIELDS_INDEX, frames_of, on_root, open_hdf5
 from ...core.own_files import inner_folder, is_own, read_bytes
@@ -155,7 +155,7 @@ def _checked(owner: str, problem: Any, name: Any, continuous: Any) -> FemSpace:
     flag(owner, "continuous", continuous)
     if not isinstance(name, str) or name not in NAMES:
         raise InputError(
-            f"{owner}: {shown(name)} is not a quantity; give one of {', '.join(map(repr, NAMES))}"
+            f"{owner}: {quote(name)} is not a quantity; give one of {', '.join(map(repr, NAMES))}"
         )
     return space_of(owner, problem.system)
 
@@ -310,6 +310,6 @@ def _chosen(times: list[float], t: float | None, frame: int | None) -> int:
     )
     if not wanted or (frame or 0) < -len(times):
         raise InputError(
-            f"no frame {shown(frame) if t is None else f'at t = {shown(t)} s'}: {stored}"
+            f"no frame {quote(frame) if t is None else f'at t = {quote(t)} s'}: {stored}"
         )
     return wanted[0]

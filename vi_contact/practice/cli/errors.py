@@ -13,7 +13,7 @@ from textwrap import shorten
 from typing import Any, NoReturn
 
 from ...core.algebra import SerialComm
-from ...core.checks import SHOWN, shown
+from ...core.checks import SHOWN, quote
 from ...core.errors import InputError, ViContactError, of_memory
 from ...core.files import sentence
 
@@ -32,9 +32,9 @@ def check_words(arguments: Sequence[str]) -> None:
     """
     for word in arguments:
         if "\0" in word:
-            raise InputError(f"{shown(word)} contains the character NUL: leave it out")
+            raise InputError(f"{quote(word)} contains the character NUL: leave it out")
         if word.startswith("--") and word.endswith("=--"):
-            raise InputError(f"{shown(word)} has no value: give one")
+            raise InputError(f"{quote(word)} has no value: give one")
     for option, value in zip(arguments, [*arguments[1:], None], strict=True):
         if (option in ("--out", "--csv", "--png") and value == "") or option in (
             "--out=",

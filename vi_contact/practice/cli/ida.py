@@ -5,7 +5,7 @@ import shlex
 import signal
 from typing import Any
 
-from ...core.checks import shown
+from ...core.checks import quote
 from ...core.errors import InputError, OutOfTime, ViContactError
 from ..studies.cases.library import located
 from .errors import say
@@ -153,7 +153,7 @@ def _ida(options: argparse.Namespace) -> str:
         launch = shlex.split(options.launch)
     except ValueError as error:
         raise InputError(
-            f"--launch {shown(options.launch)}: {error}; close the quotation mark"
+            f"--launch {quote(options.launch)}: {error}; close the quotation mark"
         ) from None
     motions = [files for motion in options.motions for files in record_set(motion)]
     study = IDA(

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.checks import counted, shown
+from ...core.checks import counted, quote
 from ...core.errors import InputError
 
 MOST_SPACED = 100_000  # periods or frequencies of a spectrum
@@ -115,7 +115,7 @@ def output_file(
         fits = False
     if not fits:
         raise InputError(
-            f"{shown(str(path))}: cannot be written; give the name of a file in a folder that "
+            f"{quote(str(path))}: cannot be written; give the name of a file in a folder that "
             "exists"
         )
     if picture and out.suffix.lower() not in PICTURES:

@@ -5,7 +5,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ...core.checks import shown
+from ...core.checks import quote
 from ...core.errors import InputError
 from .errors import world
 from .options import add_command, add_folder, output_file
@@ -204,11 +204,11 @@ def _opened(options: argparse.Namespace) -> tuple[Any, Any, str, list[float] | N
             times = [float(one) for one in asked.split(",")]
         except ValueError:
             raise InputError(
-                f"{shown(asked)} is not a list of moments: give seconds, such as 3.2,5"
+                f"{quote(asked)} is not a list of moments: give seconds, such as 3.2,5"
             ) from None
         slack = 1e-9 * (last - first)
         if not all(first - slack <= one <= last + slack for one in times):
             raise InputError(
-                f"{shown(asked)} is outside the run: give seconds from {first:g} to {last:g}"
+                f"{quote(asked)} is outside the run: give seconds from {first:g} to {last:g}"
             )
     return run, frames, str(read_copy(run.folder).get("title", "Deformed bodies")), times

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...beam import Elements
 from ...core.arguments import check
-from ...core.checks import shown
+from ...core.checks import quote
 from ...core.errors import InputError, ViContactError
 from ...core.own_files import inner_folder, is_own
 from ...run.files.folder import CHECKPOINT, HISTORY_CSV
@@ -123,7 +123,7 @@ def _plain(value: Any, key: str) -> Any:
     if isinstance(value, int | float):
         return value
     raise InputError(
-        f"{key} is {shown(value)}, which has no half: write it as a number in the case, in SI units"
+        f"{key} is {quote(value)}, which has no half: write it as a number in the case, in SI units"
     )
 
 

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.lib import format as npy
 
 from ...core.algebra import largest
-from ...core.checks import array, number, shown, whole
+from ...core.checks import array, number, quote, whole
 from ...core.errors import InputError, of_machine
 from ...core.files import on_root, write_atomically
 from ...core.own_files import is_own, open_to_read
@@ -375,6 +375,6 @@ def _check_sizes(problem: ContactProblem, about: dict[str, Any], arrays: Arrays)
             shape = (m, problem.surface.tangents.shape[1])
         kind = np.dtype(bool if name == "active" else float)
         if values.dtype != kind or values.shape != shape or not np.all(np.isfinite(values)):
-            raise InputError(f"{shown(name)} is no {shape} array of finite {kind} numbers")
+            raise InputError(f"{quote(name)} is no {shape} array of finite {kind} numbers")
     if shapes:
         raise KeyError(next(iter(shapes)))

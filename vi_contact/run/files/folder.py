@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from ...core.algebra import Comm
-from ...core.checks import shown
+from ...core.checks import quote
 from ...core.errors import InputError
 from ...core.files import (
     FIELDS,
@@ -207,7 +207,7 @@ def check_format(file: Path, number: Any) -> None:
     """Raise InputError for a file of a format, by its number, that this version does not know."""
     if number != FORMAT or isinstance(number, bool):
         raise InputError(
-            f"'{file}' has format {shown(number)} and this version of vi_contact reads {FORMAT}: "
+            f"'{file}' has format {quote(number)} and this version of vi_contact reads {FORMAT}: "
             "read it with the version that wrote it"
         )
 

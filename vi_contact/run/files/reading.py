@@ -14,7 +14,7 @@ import numpy as np
 
 from ...core.algebra import Array, Mask
 from ...core.arguments import checked
-from ...core.checks import SHOWN, shown
+from ...core.checks import SHOWN, quote
 from ...core.errors import InputError, of_machine
 from ...core.files import open_hdf5, sentence
 from ...core.hdf5 import StoredFile
@@ -151,7 +151,7 @@ def _columns(content: dict[str, Any], history: Mapping[str, Array]) -> dict[str,
         raise ValueError(f"{COLUMNS}: units and meanings are texts")
     for name in history:
         if name not in columns:
-            raise ValueError(f"{COLUMNS} does not know the column {shown(name)}")
+            raise ValueError(f"{COLUMNS} does not know the column {quote(name)}")
     return columns
 
 
@@ -165,10 +165,10 @@ def _facts(facts: dict[str, Any]) -> dict[str, Any]:
     for name, kinds in _KINDS.items():
         value = facts.get(name)
         if value is not None and not _fits(value, kinds):
-            raise ValueError(f"{SUMMARY}: {name} is {shown(value)}")
+            raise ValueError(f"{SUMMARY}: {name} is {quote(value)}")
     mean = (facts.get("iterations_per_step") or {}).get("mean")
     if mean is not None and not _fits(mean, _NUMBER):
-        raise ValueError(f"{SUMMARY}: iterations_per_step is {shown(mean)}")
+        raise ValueError(f"{SUMMARY}: iterations_per_step is {quote(mean)}")
     return facts
 
 
@@ -241,7 +241,7 @@ def _compare(path: Path, file: StoredFile, history: Mapping[str, Array]) -> None
     """
     for name, numbers in history.items():
         if name not in file or file[name].ndim != 1:
-            raise ValueError(f"{HISTORY_H5}: the column {shown(name)} is missing")
+            raise ValueError(f"{HISTORY_H5}: the column {quote(name)} is missing")
         other = file[name][: len(numbers)]
         own = numbers[: len(other)]
         same = (other == own) | (np.isnan(other) & np.isnan(own))

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ....core.arguments import checked
-from ....core.checks import shown
+from ....core.checks import quote
 from ....core.errors import InputError
 from ....core.quantities import Positive, Unit
 from ....core.units import STANDARD_GRAVITY
@@ -69,7 +69,7 @@ def read_record(
             break
     if channel is not None and reader not in (*SEVERAL, columns):
         raise InputError(
-            f"{text.path}: channel={shown(channel)} was passed but the file holds one record; "
+            f"{text.path}: channel={quote(channel)} was passed but the file holds one record; "
             "leave channel out"
         )
     record = reader.read(text)

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ....core.algebra import Array
-from ....core.checks import shown
+from ....core.checks import quote
 from ....core.errors import InputError
 
 LENGTH, DEPTH, POWER = 500, 20, 100
@@ -167,7 +167,7 @@ def check_axes(node: Any, d: int, source: str) -> None:
     for one in of if isinstance(of, tuple) else (of,):
         if isinstance(one, Expression) and (beyond := one.used & {*"xyz"[d:]}):
             raise InputError(
-                f"{source} {shown(one.text)} has {min(beyond)}, and a model of dimension {d} has "
+                f"{source} {quote(one.text)} has {min(beyond)}, and a model of dimension {d} has "
                 f"only {', '.join('xyz'[:d])}: use these only"
             )
 

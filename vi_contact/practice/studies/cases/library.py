@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ....core.algebra import Comm, SerialComm
-from ....core.checks import shown
+from ....core.checks import quote
 from ....core.errors import InputError
 from ....core.files import on_root, write_atomically
 from ....core.own_files import is_own, read_bytes
@@ -41,7 +41,7 @@ def copy_starter(name: str, folder: Path) -> list[Path]:
     that are there: they may have been changed.
     """
     if name not in starters():
-        raise InputError(f"there is no starter case {shown(name)}: {nearest(name, starters())}")
+        raise InputError(f"there is no starter case {quote(name)}: {nearest(name, starters())}")
     copies = {
         folder / one.name: one.read_bytes()
         for one in sorted(STARTERS.glob(f"{name}.*"), reverse=True)
@@ -67,7 +67,7 @@ def located(case: str) -> Path:
         return Path(case)
     if case not in builtin_cases():
         raise InputError(
-            f"there is no built-in case {shown(case)}: {nearest(case, builtin_cases())}; a file "
+            f"there is no built-in case {quote(case)}: {nearest(case, builtin_cases())}; a file "
             "ends in .toml"
         )
     return FOLDER / f"{case}.toml"
@@ -78,7 +78,7 @@ def check_format(path: Path, tables: Mapping[str, Any]) -> None:
     found = tables.get("format", FORMAT)
     if found != FORMAT or isinstance(found, bool):
         raise InputError(
-            f"{path}: format is {shown(found)}, and this version of vi_contact reads format "
+            f"{path}: format is {quote(found)}, and this version of vi_contact reads format "
             f"{FORMAT}: use the version that it was written for, or correct the number"
         )
 

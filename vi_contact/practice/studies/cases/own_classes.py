@@ -19,7 +19,7 @@ from importlib import import_module
 from inspect import Parameter, getattr_static, isfunction, signature
 from typing import Any
 
-from ....core.checks import shown
+from ....core.checks import quote
 from ....core.errors import InputError
 from .table_calls import Callee, Spot, callee
 
@@ -35,7 +35,7 @@ def packages(names: Iterable[str]) -> tuple[str, ...]:
     for name in found:
         if not isinstance(name, str) or not _PACKAGE.fullmatch(name):
             raise InputError(
-                f"--allow {shown(name)}: give the name of a Python package, such as mypackage"
+                f"--allow {quote(name)}: give the name of a Python package, such as mypackage"
             )
     return found
 
@@ -48,7 +48,7 @@ def own_class(text: str, kinds: Sequence[Any], allowed: Sequence[str], spot: Spo
     found = _CLASS.fullmatch(text)
     if found is None:
         raise spot.inside(
-            f"has the type {shown(text)}: give package.module:Name, in plain letters, digits and "
+            f"has the type {quote(text)}: give package.module:Name, in plain letters, digits and "
             "underscores"
         )
     asked = [kind for kind in kinds if is_protocol(kind)]

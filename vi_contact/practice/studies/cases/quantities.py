@@ -12,7 +12,7 @@ from importlib.resources import files
 from typing import Any, get_origin
 
 from ....core.algebra import Array
-from ....core.checks import shown
+from ....core.checks import quote
 from ....core.errors import InputError
 from .expressions import LENGTH, Expression, Places
 from .table_calls import Spot
@@ -55,7 +55,7 @@ def text_node(text: str, members: Sequence[Any], spot: Spot) -> Any:
         value = float(expression())
         if not math.isfinite(value) or (float not in members and value != int(value)):
             raise spot.wrong(
-                f"is {shown(text)}, which is {value:g}: give a finite number, a whole one of things"
+                f"is {quote(text)}, which is {value:g}: give a finite number, a whole one of things"
             )
         return value if float in members else int(value)
     return Places(expression) if kind == FIELD else expression
@@ -96,11 +96,11 @@ def _expression(text: str, letters: str, spot: Spot) -> Expression:
         if found is None or found[2] in tuple(letters):
             return Expression(text, letters)
         if spot.unit is None:
-            raise InputError(f"no unit is known for it here: leave {shown(found[2])} out")
+            raise InputError(f"no unit is known for it here: leave {quote(found[2])} out")
         (factor, dimension), (own, asked) = _unit(found[2]), _unit(spot.unit)
         if dimension != asked:
             proper = "% or as a plain number" if spot.unit == "1" else spot.unit
-            raise InputError(f"{shown(found[2])} is not a unit of it: give it in {proper}")
+            raise InputError(f"{quote(found[2])} is not a unit of it: give it in {proper}")
         return Expression(repr(float(found[1]) * (factor / own)))
     except InputError as error:
         arithmetic = f" of {', '.join(letters)}" if letters else ""
@@ -109,7 +109,7 @@ def _expression(text: str, letters: str, spot: Spot) -> Expression:
             if found is None
             else ""
         )
-        raise spot.wrong(f"is {shown(text)}: {ask}{error}") from None
+        raise spot.wrong(f"is {quote(text)}: {ask}{error}") from None
 
 
 def _unit(text: str) -> tuple[float, Dimension]:
@@ -122,13 +122,13 @@ def _unit(text: str) -> tuple[float, Dimension]:
     while place < len(text):
         found = _FACTOR.match(text, place)
         if found is None:
-            raise InputError(f"{shown(text)} is not a unit: write one as kN/m3, cm/s^2 or Pa*s")
+            raise InputError(f"{quote(text)} is not a unit: write one as kN/m3, cm/s^2 or Pa*s")
         sign, name, digits, raised = found.groups()
         below = sign == "/" or (below and not sign)
         power = (int(digits) if digits else {"²": 2, "³": 3}.get(raised, 1)) * (-1 if below else 1)
         if name not in _UNITS:
             known = ", ".join((*_TABLES["with_prefix"], *_TABLES["alone"]))
-            raise InputError(f"{shown(name)} is not a unit here: there are {known}, kPa, mm")
+            raise InputError(f"{quote(name)} is not a unit here: there are {known}, kPa, mm")
         factor, *dimension = _UNITS[name]
         size *= factor**power
         total = tuple(a + power * b for a, b in zip(total, dimension, strict=True))

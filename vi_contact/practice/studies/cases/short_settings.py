@@ -9,7 +9,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from ....core.checks import shown
+from ....core.checks import quote
 from ....core.errors import InputError
 from .bodies import own_body
 from .parsing import nearest
@@ -67,7 +67,7 @@ class ShortOptions:
         axes = len(direction) if isinstance(direction, list) else _axes(tables)
         if not all(files) or len(files) > 2:
             raise InputError(
-                f"--motion {shown(self.motion)}: give FILE, or FILE,FILE with a vertical motion"
+                f"--motion {quote(self.motion)}: give FILE, or FILE,FILE with a vertical motion"
             )
         motions: list[dict[str, Any]] = []
         for number, file in enumerate(files):
@@ -199,6 +199,6 @@ def _named(kind: str, name: str, methods: Mapping[str, Sequence[str]]) -> str:
             return toml_value({"type": owner, "method": {"type": name}})
     if name not in methods and ":" not in name:
         raise InputError(
-            f"unknown {kind} {shown(name)}: {nearest(name, [*methods, *chain(*methods.values())])}"
+            f"unknown {kind} {quote(name)}: {nearest(name, [*methods, *chain(*methods.values())])}"
         )
     return toml_value({"type": name})

@@ -10,7 +10,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from ....core.checks import flag, shown
+from ....core.checks import flag, quote
 from ....core.errors import InputError
 from .parsing import nearest
 
@@ -86,15 +86,15 @@ def _stage(where: str, given: Mapping[str, Any], tables: Mapping[str, Any]) -> S
             raise InputError(f"{where} has the unknown key '{key}': {nearest(key, KEYS)}")
     name, kind, release = given.get("name", ""), given.get("type"), given.get("release", False)
     if not isinstance(name, str) or not _NAME.fullmatch(name):
-        raise InputError(f"{where} has name = {shown(name)}: give letters, digits and underscores")
+        raise InputError(f"{where} has name = {quote(name)}: give letters, digits and underscores")
     if kind not in ("static", "dynamic"):
-        raise InputError(f'{where} has type = {shown(kind)}: give "static" or "dynamic"')
+        raise InputError(f'{where} has type = {quote(kind)}: give "static" or "dynamic"')
     flag(where, "release", release)
     whole = {key: value for key, value in tables.items() if key != "stage"}
     for key in (key for key in BY_KEY if key in given):
         if not isinstance(given[key], dict) or not isinstance(whole.get(key, {}), dict):
             raise InputError(
-                f"{where}: {key} is {shown(given[key])}: give a table, here and in the case"
+                f"{where}: {key} is {quote(given[key])}: give a table, here and in the case"
             )
         # one of them ends a run
         lasts = {"steps", "t_end"} if {"steps", "t_end"} & given[key].keys() else set()
