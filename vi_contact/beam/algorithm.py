@@ -32,7 +32,7 @@ import numpy as np
 
 from ..core import checks
 from ..core.algebra import Array, SerialFactor, SerialMatrix
-from ..core.checks import counted, function, instance, number, optional, provides, whole
+from ..core.checks import check_count, function, instance, number, optional, provides, whole
 from ..core.errors import StepFailure
 from ..core.files import write_csv
 from .elements import Elements, beam_matrices
@@ -196,7 +196,7 @@ def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) 
     kept = (len(COLUMNS) + 1) * steps + (
         4 * stepper.elements.count * (steps // every) if every else 0
     )
-    counted("run_beam", f"a run of {steps} steps", kept, "numbers to keep")
+    check_count("run_beam", f"a run of {steps} steps", kept, "numbers to keep")
     x = stepper.elements.nodes(stepper.beam.length)
     y0 = np.concatenate([start.at("theta", x), start.at("u", x)])
     w0 = np.concatenate([start.at("omega", x), start.at("v", x)])

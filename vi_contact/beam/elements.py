@@ -27,7 +27,7 @@ import scipy.sparse as sp
 
 from ..core.algebra import Array
 from ..core.arguments import check_fields, checked
-from ..core.checks import counted, number
+from ..core.checks import check_count, number
 from ..core.errors import InputError
 from ..core.quantities import Between
 from .values import Rod, TimoshenkoBeam
@@ -61,7 +61,7 @@ class Elements:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        counted("Elements", "count", self.count, "elements", most=MOST)
+        check_count("Elements", "count", self.count, "elements", most=MOST)
         if self.published_end and self.reduced_shear:
             raise InputError(
                 "Elements: the published end function goes with reduced_shear=False, as in the "

@@ -22,7 +22,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..core.algebra import Array
 from ..core.arguments import checked
-from ..core.checks import array, counted, flag, function, integers, mask, number, shape_of, whole
+from ..core.checks import (
+    array,
+    check_count,
+    flag,
+    function,
+    integers,
+    mask,
+    number,
+    shape_of,
+    whole,
+)
 from ..core.errors import InputError
 from ..core.quantities import Between, Positive, Unit
 from .loops import check_orientation, check_simple, check_size
@@ -53,7 +63,7 @@ class BoundaryMesh:
 
     def __post_init__(self) -> None:
         points = array("BoundaryMesh", "points", self.points, (None, 2), unit="m")
-        counted("BoundaryMesh", "points", len(points), "elements", most=MOST_ELEMENTS)
+        check_count("BoundaryMesh", "points", len(points), "elements", most=MOST_ELEMENTS)
         given_sizes = integers("BoundaryMesh", "loop_sizes", self.loop_sizes, (None,))
         sizes = tuple(given_sizes.tolist()) or (len(points),)
         if min(sizes) < 3 or sum(sizes) != len(points):
@@ -218,9 +228,11 @@ def polygon(
         length = number("polygon", "the element length h", h, positive=True, unit="m")
         with np.errstate(over="ignore"):
             wanted = np.maximum(1.0, np.ceil(np.hypot(*sides.T) / length - 1e-9))
-        counted("polygon", f"h = {length:g} m", float(wanted.sum()), "elements", most=MOST_ELEMENTS)
+        check_count(
+            "polygon", f"h = {length:g} m", float(wanted.sum()), "elements", most=MOST_ELEMENTS
+        )
         counts = wanted.astype(int)
-    counted("polygon", "h", int(counts.sum()), "elements", most=MOST_ELEMENTS)
+    check_count("polygon", "h", int(counts.sum()), "elements", most=MOST_ELEMENTS)
     fractions = [np.arange(count)[:, None] / count for count in counts]
     points = [p + f * side for p, f, side in zip(start, fractions, sides, strict=True)]
     labels = np.repeat(np.arange(len(start)), counts)
@@ -244,7 +256,7 @@ def circle(
         exterior: whether the body is the space around a round hole instead.
     """
     middle = array("circle", "centre", centre, (2,), unit="m")
-    counted("circle", "count", count, "elements", most=MOST_ELEMENTS)
+    check_count("circle", "count", count, "elements", most=MOST_ELEMENTS)
     once_around = -2.0 * np.pi if exterior else 2.0 * np.pi
     angle = once_around * (np.arange(count) / count) - 0.5 * np.pi
     directions = np.stack([np.cos(angle), np.sin(angle)], axis=1)

@@ -98,7 +98,7 @@ def check_word(name: str, given: object, known: Sequence[str]) -> None:
         raise InputError(f"unknown {name} {quote(str(given))}: choose one of {', '.join(known)}")
 
 
-def counted(
+def check_count(
     owner: str, asked: str, value: Any, things: str = "samples", *, most: int = LARGEST
 ) -> int:
     """Return how many things an input asks for, before memory is taken for them.

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.checks import counted, quote
+from ...core.checks import check_count, quote
 from ...core.errors import InputError
 
 MOST_SPACED = 100_000  # periods or frequencies of a spectrum
@@ -92,7 +92,7 @@ def spaced(option: str, values: Sequence[float]) -> Any:
             "2 on"
         )
     return np.geomspace(
-        first, last, counted(option, f"N = {count:g}", count, "numbers", most=MOST_SPACED)
+        first, last, check_count(option, f"N = {count:g}", count, "numbers", most=MOST_SPACED)
     )
 
 

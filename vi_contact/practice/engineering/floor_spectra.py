@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.checks import array, counted, flag, instance, number, optional
+from ...core.checks import array, check_count, flag, instance, number, optional
 from ...core.errors import InputError
 from ..ground_motion.record import Record
 from ..ground_motion.spectra import ResponseSpectrum, response_spectrum
@@ -63,7 +63,7 @@ def recorded_motion(history: Mapping[str, Array], column: str, *, relative: bool
     dt = float(np.median(steps))
     if np.ptp(steps) > 1e-6 * dt:
         asked = (t[-1] - t[0]) / dt * (1.0 + 1e-12)
-        counted(f"column '{column}'", f"the step of {dt:g} s in {t[-1] - t[0]:g} s", asked)
+        check_count(f"column '{column}'", f"the step of {dt:g} s in {t[-1] - t[0]:g} s", asked)
         even = t[0] + dt * np.arange(int(np.floor(asked)) + 1)
         values = np.interp(even, t, values)
     frame = "relative" if relative else "absolute"

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...core.algebra import Array
 from ...core.arguments import checked
-from ...core.checks import counted
+from ...core.checks import check_count
 from ...core.errors import InputError
 from ...core.quantities import Finite, Positive, Unit
 from .record import Record
@@ -46,7 +46,7 @@ def resampled(record: Record, dt: Annotated[float, Positive, Unit("s")]) -> Reco
         InputError: a dt that is not such a ratio, or longer than the record.
     """
     dt = float(dt)
-    counted("resampled", f"dt={dt!r} s", record.duration / dt)
+    check_count("resampled", f"dt={dt!r} s", record.duration / dt)
     # late: it takes longer to import than the rest of the package
     from scipy.signal import resample_poly
 
@@ -134,7 +134,7 @@ def padded(record: Record, before: float = 0.0, after: float = 0.0) -> Record:
         )
     asked = [length / record.dt * (1.0 - 1e-9) for length in (before, after)]
     total = record.acceleration.size + sum(asked)
-    counted("padded", f"before={before!r} and after={after!r} s", total)
+    check_count("padded", f"before={before!r} and after={after!r} s", total)
     counts = [math.ceil(samples) for samples in asked]
     note = f"zeros added: {counts[0] * record.dt:g} s before, {counts[1] * record.dt:g} s after"
     return record.changed(np.pad(record.acceleration, counts), note)
@@ -230,7 +230,7 @@ def filtered(
         lowest = min(corners)
         ringing = 6.0 / (lowest * record.dt)
         size = record.acceleration.size
-        counted("filtered", f"a corner of {lowest:g} Hz", 3.0 * ringing + size)
+        check_count("filtered", f"a corner of {lowest:g} Hz", 3.0 * ringing + size)
         tail = np.zeros(math.ceil(ringing))
         forward = sosfilt(sections, np.concatenate([tail, record.acceleration, tail]))
         both_ways = sosfilt(sections, forward[::-1])[::-1]

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...core.algebra import Array
 from ...core.arguments import checked
-from ...core.checks import counted
+from ...core.checks import check_count
 from ...core.errors import InputError
 from .record import Record
 
@@ -159,7 +159,7 @@ def response_spectrum(record: Record, periods: Array, *, damping: float = 0.05) 
             f"{record.dt:g} s and has the peak acceleration alone; begin with longer periods"
         )
     numbers = float(row.size) * record.acceleration.size
-    counted("response_spectrum", f"{row.size} periods", numbers, most=MOST)
+    check_count("response_spectrum", f"{row.size} periods", numbers, most=MOST)
 
     # Oscillators that need the same number of looks a step go together.
     wanted = 2 ** np.ceil(np.log2(PER_PERIOD * record.dt / row))
