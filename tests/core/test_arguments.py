@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import ArrayLike
 
 from vi_contact.core.algebra import Array
-from vi_contact.core.arguments import check_fields, checked
+from vi_contact.core.arguments import check_arguments, check_fields
 from vi_contact.core.errors import InputError
 from vi_contact.core.quantities import (
     RATIO,
@@ -132,7 +132,7 @@ def test_subclasses_inherit_the_marks_and_add_theirs() -> None:
 
 
 def test_functions_say_the_same() -> None:
-    @checked
+    @check_arguments
     def bend(
         moment: Annotated[float, Finite, Unit("N·m")],
         *lengths: float,
@@ -207,7 +207,7 @@ def test_truth_values_are_no_numbers() -> None:
 def test_a_protocol_with_brackets_is_that_protocol() -> None:
     """As those in numpy's ArrayLike are."""
 
-    @checked
+    @check_arguments
     def centre(where: ArrayLike) -> ArrayLike:
         return where
 

@@ -17,7 +17,7 @@ from public_callables import callables, right
 
 import vi_contact as vc
 from vi_contact import ground_motion, laws, meshes, run, studies
-from vi_contact.core.arguments import check, check_fields, checked, fits, words
+from vi_contact.core.arguments import check, check_arguments, check_fields, fits, words
 from vi_contact.core.errors import InputError
 
 pytestmark = pytest.mark.serial
@@ -205,7 +205,7 @@ def test_what_is_checked_keeps_its_face() -> None:
     """Name, text and signature, which pages of names and case files read; arguments that are wrong
     by name stay."""
 
-    @checked
+    @check_arguments
     def one(x: float, *, name: str = "a") -> float:
         """Return x."""
         return x

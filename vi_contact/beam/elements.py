@@ -26,7 +26,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..core.algebra import Array
-from ..core.arguments import check_fields, checked
+from ..core.arguments import check_arguments, check_fields
 from ..core.checks import check_count, number
 from ..core.errors import InputError
 from ..core.quantities import Between
@@ -79,7 +79,7 @@ class Elements:
         )[1:]
 
 
-@checked
+@check_arguments
 def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> tuple[Any, Any, Array]:
     """Assemble the matrices of the beam: ½ wᵀMw and ½ yᵀSy are its energies [J], and C = a2 S.
 
@@ -128,7 +128,7 @@ def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> tuple[Any, Any, A
     return M, stiffness, load
 
 
-@checked
+@check_arguments
 def rod_matrices(rod: Rod, count: Annotated[int, Between(2, math.inf)]) -> tuple[Any, Any, Array]:
     """Assemble the matrices of the rod: ½ wᵀMw and ½ vᵀKv are its energies [J], and C = a1 K.
 

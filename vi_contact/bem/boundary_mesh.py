@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.algebra import Array
-from ..core.arguments import checked
+from ..core.arguments import check_arguments
 from ..core.checks import (
     array,
     check_count,
@@ -239,7 +239,7 @@ def polygon(
     return BoundaryMesh(np.concatenate(points), labels=labels, exterior=exterior)
 
 
-@checked
+@check_arguments
 def circle(
     radius: Annotated[float, Positive, Unit("m")],
     count: Annotated[int, Between(3, math.inf)],

@@ -1,8 +1,8 @@
 """Check the arguments of public functions against their types: a sentence, and no traceback.
 
-``@checked`` is for functions that users call with their own values, and that look at these before
-any other function does; ``check_fields`` is for dataclasses. Both check the limits of numbers that
-annotations mark: ``core.quantities``.
+``@check_arguments`` is for functions that users call with their own values, and that look at these
+before any other function does; ``check_fields`` is for dataclasses. Both check the limits of
+numbers that annotations mark: ``core.quantities``.
 """
 
 import math
@@ -28,7 +28,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
-def checked(function: Callable[P, R]) -> Callable[P, R]:
+def check_arguments(function: Callable[P, R]) -> Callable[P, R]:
     """Return the function with a check of its arguments.
 
     The check raises InputError for an argument that is not of its type, or beyond the limits that

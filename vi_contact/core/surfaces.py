@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .algebra import Array, Comm, Indices, Mask, Matrix, SerialComm, largest, on_first, total
-from .arguments import checked
+from .arguments import check_arguments
 from .census import Census
 from .checks import function, quote
 from .collective import call_user
@@ -331,7 +331,7 @@ class ContactSurface:
             )
         return replace(self, frictionless_corners=True)
 
-    @checked
+    @check_arguments
     def on_springs(
         self, stiffness: Annotated[float, Positive, Unit("Pa/m"), "the foundation modulus"]
     ) -> "ContactSurface":

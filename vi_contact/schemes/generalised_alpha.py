@@ -35,7 +35,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from ..core.algebra import Array, EffectiveMatrix
-from ..core.arguments import checked
+from ..core.arguments import check_arguments
 from ..core.checks import quote, real
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
@@ -217,7 +217,7 @@ class GeneralisedAlpha(AlphaStep):
         return self
 
     @classmethod
-    @checked
+    @check_arguments
     def spectral_radius(
         cls,
         rho_inf: Annotated[

@@ -10,7 +10,7 @@ from typing import Annotated
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.arguments import check_fields, checked
+from ...core.arguments import check_arguments, check_fields
 from ...core.checks import check_count
 from ...core.errors import InputError
 from ...core.quantities import RATIO, Between, NotNegative, Positive, Unit
@@ -90,7 +90,7 @@ class Envelope:
         return np.where(times < self.rise, rising, falling)
 
 
-@checked
+@check_arguments
 def synthetic(
     spectrum: KanaiTajimi,
     duration: Annotated[float, Unit("s")],

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.arguments import checked
+from ...core.arguments import check_arguments
 from ...core.checks import check_count
 from ...core.errors import InputError
 from .record import Record
@@ -128,7 +128,7 @@ def _series(time: Array | float, omega: Array, zeta: float, first: int) -> Array
     return np.array([total, rate])
 
 
-@checked
+@check_arguments
 def response_spectrum(record: Record, periods: Array, *, damping: float = 0.05) -> ResponseSpectrum:
     """Return the peaks of relative displacement and velocity and of absolute acceleration.
 
@@ -171,7 +171,7 @@ def response_spectrum(record: Record, periods: Array, *, damping: float = 0.05) 
     return ResponseSpectrum(row, damping, *peaks)
 
 
-@checked
+@check_arguments
 def fourier_spectrum(record: Record) -> tuple[Array, Array]:
     """Return the frequencies [Hz], up to the Nyquist frequency, and the amplitudes |A(f)| [m/s].
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array, Indices
-from ...core.arguments import checked
+from ...core.arguments import check_arguments
 from ...core.checks import number, optional
 from ...core.errors import InputError
 from ...core.files import frames_of, write_output
@@ -170,7 +170,7 @@ def _round_down(factor: float) -> float:
     return float(max([1.0, *(step * power for step in (1.0, 2.0, 5.0) if step * power <= factor)]))
 
 
-@checked
+@check_arguments
 def plot_deformed(
     run: RunFolder,
     path: str | Path,
@@ -210,7 +210,7 @@ def _headed(title: str, scene: Scene) -> str:
     return "\n".join(wrap(plain(title) + told, 64))
 
 
-@checked
+@check_arguments
 def film(
     run: RunFolder,
     path: str | Path,
@@ -314,7 +314,7 @@ def _trace(axis: Any, run: RunFolder, column: str, times: Array) -> Any:
     return axis.axvline(times[0], color="tab:red", lw=1.2)
 
 
-@checked
+@check_arguments
 def draw_run(
     run: RunFolder,
     out: str | Path,

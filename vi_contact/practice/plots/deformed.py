@@ -17,7 +17,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ...core.algebra import Array, Indices
-from ...core.arguments import checked
+from ...core.arguments import check_arguments
 from ...core.checks import array
 from ...core.errors import InputError, of_machine
 from ...core.files import FIELDS, frames_of, open_hdf5
@@ -165,7 +165,7 @@ def stored_tangents(contact: Geometry) -> Array:
     )
 
 
-@checked
+@check_arguments
 def read_frames(run: RunFolder | str | Path) -> StoredFrames:
     """Read the frames from the fields of a run in plane or space.
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ...core.algebra import Array, Indices
-from ...core.arguments import checked
+from ...core.arguments import check_arguments
 from ...core.corners import FEATURE_ANGLE
 from ...core.errors import InputError
 from ...core.files import frames_of
@@ -247,7 +247,7 @@ def moments(history: History) -> list[float]:
     return history["t"][[0, leading(history)[1], -1]].tolist()
 
 
-@checked
+@check_arguments
 def plot_faces(
     run: RunFolder,
     path: str | Path,

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.arguments import checked
+from ...core.arguments import check_arguments
 from ...core.errors import InputError
 from ...core.units import STANDARD_GRAVITY
 from ..engineering.floor_spectra import TransferFunction
@@ -27,7 +27,7 @@ SAMPLES_A_PERIOD = (
 )
 
 
-@checked
+@check_arguments
 def plot_motion(
     record: Record, path: str | Path, *, title: str | None = None, units: str = "m/s2"
 ) -> Path:
@@ -58,7 +58,7 @@ def plot_motion(
     return save(figure, path)
 
 
-@checked
+@check_arguments
 def plot_spectra(
     spectra: Mapping[str, ResponseSpectrum],
     path: str | Path,
@@ -126,7 +126,7 @@ def plot_spectra(
     return save(figure, path)
 
 
-@checked
+@check_arguments
 def plot_loop(
     loop: Loop,
     path: str | Path,
@@ -156,7 +156,7 @@ def plot_loop(
     return save(figure, path)
 
 
-@checked
+@check_arguments
 def plot_transfer(found: TransferFunction, path: str | Path, *, title: str) -> Path:
     """Draw the amplitude over frequency, both logarithmic."""
     figure, ((axis,),) = canvas(1, 1, (7.5, 4.5))

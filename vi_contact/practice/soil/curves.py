@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.arguments import checked
+from ...core.arguments import check_arguments
 from ...core.checks import array, check_word, quote
 from ...core.errors import InputError
 from ...core.quantities import RATIO, Between, NotNegative, Positive, Unit
@@ -73,7 +73,7 @@ class SoilCurves:
         object.__setattr__(self, "damping", tuple(damping.tolist()))
 
     @classmethod
-    @checked
+    @check_arguments
     def linear(
         cls, damping: Annotated[float, NotNegative, RATIO, "the damping ratio"]
     ) -> "SoilCurves":
@@ -98,7 +98,7 @@ class SoilCurves:
         return cls(_TABLES["strain"], table["reduction"], table["damping"], name)
 
     @classmethod
-    @checked
+    @check_arguments
     def vucetic_dobry(
         cls, plasticity: Annotated[float, NotNegative, "the plasticity index [%]"]
     ) -> "SoilCurves":
@@ -126,7 +126,7 @@ class SoilCurves:
         return cls(_TABLES["strain"], reduction, damping, f"Vucetic-Dobry PI {index:g}")
 
     @classmethod
-    @checked
+    @check_arguments
     def darendeli(
         cls,
         *,

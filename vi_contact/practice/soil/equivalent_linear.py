@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
 from ...core.algebra import Array, Comm, SerialComm, largest
-from ...core.arguments import checked
+from ...core.arguments import check_arguments
 from ...core.checks import instance, number, optional, quote, refuse, several, whole
 from ...core.errors import InputError, ViContactError
 from ...core.quantities import Positive, Unit
@@ -56,7 +56,7 @@ class SiteResponse:
     surface: Record
     iterations: int
 
-    @checked
+    @check_arguments
     def column(
         self,
         *,

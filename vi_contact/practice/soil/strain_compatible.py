@@ -7,7 +7,7 @@ from typing import Annotated, Any, Generic, TypeVar
 import numpy as np
 
 from ...core.algebra import Array, largest
-from ...core.arguments import checked
+from ...core.arguments import check_arguments
 from ...core.checks import describe_point, refuse
 from ...core.errors import InputError
 from ...core.quantities import RATIO, Positive, Remedy
@@ -43,7 +43,7 @@ class StrainCompatible(Generic[T]):
     changes: tuple[float, ...]
 
 
-@checked
+@check_arguments
 def strain_compatible(
     mesh: Any,
     material: Materials,

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ...core.arguments import checked
+from ...core.arguments import check_arguments
 from ...core.errors import InputError, ViContactError
 from ...core.files import sentence, write_output
 from ...core.own_files import is_own
@@ -32,7 +32,7 @@ from .refinement import refinement
 WRITERS = {".html": write_web_page, ".pdf": write_pages}
 
 
-@checked
+@check_arguments
 def report(
     folder: str | Path,
     *,
@@ -106,7 +106,7 @@ def _model(folder: Path, picture: Path) -> tuple[dict[str, Any], list[Path]]:
     return model, [picture]
 
 
-@checked
+@check_arguments
 def comparisons(folder: str | Path) -> tuple[Comparison, ...]:
     """Return the comparisons of a run folder.
 

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ...core.algebra import Array, Mask
-from ...core.arguments import checked
+from ...core.arguments import check_arguments
 from ...core.checks import SHOWN, quote
 from ...core.errors import InputError, of_machine
 from ...core.files import open_hdf5, sentence
@@ -77,7 +77,7 @@ class RunFolder:
     contact: ContactGeometry | None
 
 
-@checked
+@check_arguments
 def read_run(folder: str | Path) -> RunFolder:
     """Read a run folder of ``simulate``.
 

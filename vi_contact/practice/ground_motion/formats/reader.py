@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ....core.arguments import checked
+from ....core.arguments import check_arguments
 from ....core.checks import quote
 from ....core.errors import InputError
 from ....core.quantities import Positive, Unit
@@ -28,7 +28,7 @@ SHORTEST_STEP = 1e-6
 LONGEST_STEP = 100.0
 
 
-@checked
+@check_arguments
 def read_record(
     path: str | os.PathLike[str],
     units: str | None = None,
