@@ -21,7 +21,7 @@ import numpy as np
 
 from .checks import quote, real, shape_of, suggest_object
 from .errors import InputError
-from .quantities import Between, Quantity, quantities
+from .quantities import Between, Quantity, read_quantities
 
 _PLURALS: dict[Any, str] = {float: "real numbers", int: "whole numbers", str: "texts"}
 P = ParamSpec("P")
@@ -35,26 +35,26 @@ def check_arguments(function: Callable[P, R]) -> Callable[P, R]:
     its annotation marks (``core.quantities``).
     """
     owner = function.__qualname__
-    get_parameters = cache(lambda: _parameters(function))  # classes may follow
+    get_parameters = cache(lambda: _read_parameters(function))  # classes may follow
 
     @wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> R:
         own_signature, quantity_of = get_parameters()
         for name, value in own_signature.bind(*args, **kwargs).arguments.items():
             if name in quantity_of:
-                _check(owner, name, value, quantity_of[name])
+                _check_quantity(owner, name, value, quantity_of[name])
         return function(*args, **kwargs)
 
     return call
 
 
-def _parameters(function: Callable[..., Any]) -> tuple[Signature, dict[str, Quantity]]:
+def _read_parameters(function: Callable[..., Any]) -> tuple[Signature, dict[str, Quantity]]:
     """Return the signature, and what the annotation of each parameter asks for.
 
     Parameters that collect others, such as ``*args``, are left out.
     """
     own_signature = signature(function)
-    quantity_of = quantities(function)
+    quantity_of = read_quantities(function)
     collecting = (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD)
     names = [
         name
@@ -71,19 +71,19 @@ def check_fields(value: Any) -> None:
     (``core.quantities``). Call it in ``__post_init__``.
     """
     kind: Any = type(value)
-    for name, quantity in _fields(kind):
-        _check(kind.__name__, name, getattr(value, name), quantity)
+    for name, quantity in _read_fields(kind):
+        _check_quantity(kind.__name__, name, getattr(value, name), quantity)
 
 
 @cache
-def _fields(kind: Any) -> tuple[tuple[str, Quantity], ...]:
+def _read_fields(kind: Any) -> tuple[tuple[str, Quantity], ...]:
     """Return what the annotation of each field of a dataclass asks for."""
-    quantity_of = quantities(kind)
+    quantity_of = read_quantities(kind)
     names = [field.name for field in fields(kind) if field.name in quantity_of]
     return tuple((name, quantity_of[name]) for name in names)
 
 
-def check(owner: str, meaning: str, value: Any, kind: Any) -> None:
+def check_type(owner: str, meaning: str, value: Any, kind: Any) -> None:
     """Raise InputError unless the value is of a type.
 
     Args:
@@ -93,10 +93,10 @@ def check(owner: str, meaning: str, value: Any, kind: Any) -> None:
         kind: the type, as annotations have it.
     """
     if not fits(value, kind):
-        raise InputError(f"{owner}: {meaning} is {quote(value)}; give {words(kind)}")
+        raise InputError(f"{owner}: {meaning} is {quote(value)}; give {describe_type(kind)}")
 
 
-def _check(owner: str, name: str, value: Any, quantity: Quantity) -> None:
+def _check_quantity(owner: str, name: str, value: Any, quantity: Quantity) -> None:
     """Raise InputError unless the value is of its type and within its limits.
 
     Args:
@@ -113,7 +113,7 @@ def _check(owner: str, name: str, value: Any, quantity: Quantity) -> None:
     # Of a single number, type and limit are one question, with one sentence.
     number_kind = None if limit is None else _single_number(kind)
     if number_kind is None and not fits(value, kind):
-        remedy = f"give {words(kind)}"
+        remedy = f"give {describe_type(kind)}"
         if quantity.other is not None:
             remedy = f"{suggest_object(value)}{quantity.other.text}"
         elif limit is not None and limit.remedy:
@@ -216,13 +216,13 @@ def _fits_object(value: Any, kind: Any, origin: Any) -> bool:
     return isinstance(value, kind) if isclass(kind) and origin is None else True
 
 
-def words(kind: Any) -> str:
+def describe_type(kind: Any) -> str:
     """Return the words for a type in a sentence."""
     origin = typing.get_origin(kind)
     inside = typing.get_args(kind)
     if _is_union(kind):
         is_path = any(map(_is_path, inside))
-        texts = [words(member) for member in inside if not (is_path and member is str)]
+        texts = [describe_type(member) for member in inside if not (is_path and member is str)]
         return " or ".join(dict.fromkeys(texts))
     if kind is None or kind is type(None):
         return "None"
@@ -234,7 +234,7 @@ def words(kind: Any) -> str:
         count = "" if inside[-1] is Ellipsis else f"{len(inside)} "
         if len(set(inside) - {Ellipsis}) == 1:
             return f"{count}{_PLURALS.get(inside[0], 'values')} in a tuple"
-        return f"a tuple of {', '.join(map(words, inside))}"
+        return f"a tuple of {', '.join(map(describe_type, inside))}"
     if origin in (Sequence, Iterable, list):
         return f"{_PLURALS.get(inside[0], 'values')} in a list"
     if origin in (Mapping, dict):

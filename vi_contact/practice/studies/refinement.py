@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...beam import Elements
-from ...core.arguments import check
+from ...core.arguments import check_type
 from ...core.checks import quote
 from ...core.errors import InputError, ViContactError
 from ...core.own_files import inner_folder, is_own
@@ -41,7 +41,7 @@ def refine(
     """
     from .cases.case import read_case  # late: finite elements
 
-    check("refine", "folder", folder, str | Path)
+    check_type("refine", "folder", folder, str | Path)
     run, failed = read_run(folder), {}
     if not is_own(run.folder / COPY):
         raise InputError(

@@ -12,7 +12,7 @@ from typing import Annotated, ClassVar
 from ....core.algebra import Array
 from ....core.arguments import check_fields
 from ....core.checks import check_word
-from ....core.quantities import RATIO, Between, Positive, Unit, quantities
+from ....core.quantities import RATIO, Between, Positive, Unit, read_quantities
 
 History = Mapping[str, Array]  # column -> values (rows,)
 Inputs = Mapping[str, tuple[float, str]]  # name -> (value, unit)
@@ -103,7 +103,7 @@ class Check(ABC):
 
     def given(self) -> Inputs:
         """Return the fields that the formula takes."""
-        asked = quantities(type(self))
+        asked = read_quantities(type(self))
         return {
             key: (it, asked[key].symbol or "-")
             for key in self.formula.fields

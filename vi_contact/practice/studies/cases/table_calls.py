@@ -19,7 +19,7 @@ from inspect import Parameter, signature
 from typing import Any
 
 from ....core.errors import InputError
-from ....core.quantities import Quantity, quantities
+from ....core.quantities import Quantity, read_quantities
 
 Context = Mapping[str, Any]
 Node = (
@@ -136,7 +136,7 @@ def callee(
     ``only`` is what a file may give; parameters ``given`` are supplied.
     """
     plain_class = isinstance(function, type) and not is_dataclass(function)
-    said = quantities(function.__init__ if plain_class else function)  # type: ignore[misc]
+    said = read_quantities(function.__init__ if plain_class else function)  # type: ignore[misc]
     found = signature(function).parameters
     parameters = {
         key: one
