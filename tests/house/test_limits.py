@@ -88,7 +88,7 @@ def test_every_limit_of_an_annotation_is_told() -> None:
                     call(found, argument, wrong, values)
                 defects.append(f"{name}({argument}={wrong}) is taken")
             except InputError as error:
-                if asked.named(argument) not in str(error) or limit.in_words(whole) not in str(
+                if asked.describe(argument) not in str(error) or limit.in_words(whole) not in str(
                     error
                 ):
                     defects.append(f"{name}({argument}={wrong}): {error}")

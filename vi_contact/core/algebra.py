@@ -177,7 +177,7 @@ class Algebra(Protocol):
             The rows (k, n of all ranks), their columns numbered over all ranks.
         """
 
-    def replaced_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
+    def replace_identity_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
         """Return the identity with some of its rows replaced.
 
         Args:
@@ -243,7 +243,7 @@ class EffectiveMatrix:
                 self.__dict__.setdefault("factor", factor)
         return self._last[1]
 
-    def factorised_as(self, other: "EffectiveMatrix") -> "EffectiveMatrix":
+    def share_factors(self, other: "EffectiveMatrix") -> "EffectiveMatrix":
         """Return this matrix with the factors of another, whose entries are the same."""
         self._last = other._last
         if other.factorised:
@@ -395,7 +395,7 @@ class SerialAlgebra:
         """Return these owned rows of A, their columns numbered over all ranks."""
         return serial(A).csr[rows]
 
-    def replaced_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
+    def replace_identity_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
         """Return the identity with some of its rows replaced.
 
         Args:
@@ -403,7 +403,7 @@ class SerialAlgebra:
             rows: (k,) those that are replaced.
             entries: (k, n) what stands in them.
         """
-        return SerialMatrix(identity_with(n, rows, entries, first=0))
+        return SerialMatrix(build_identity_with_rows(n, rows, entries, first=0))
 
     def factor(self, A: Matrix) -> Factor:
         """Return a factor of A."""
@@ -453,7 +453,9 @@ def upper_blocks(rows: sp.csr_matrix, width: int, first: int) -> tuple[Indices, 
     return np.cumsum(np.concatenate(counts)), np.concatenate(columns), np.concatenate(values)
 
 
-def identity_with(n: int, rows: Indices, entries: sp.csr_matrix, *, first: int) -> sp.coo_matrix:
+def build_identity_with_rows(
+    n: int, rows: Indices, entries: sp.csr_matrix, *, first: int
+) -> sp.coo_matrix:
     """Return rows of the identity, some of them replaced.
 
     Args:

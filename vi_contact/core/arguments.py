@@ -118,7 +118,7 @@ def _check_quantity(owner: str, name: str, value: Any, quantity: Quantity) -> No
             remedy = f"{suggest_object(value)}{quantity.other.text}"
         elif limit is not None and limit.remedy:
             remedy = limit.remedy
-        raise InputError(f"{owner}: {quantity.named(name)} is {quote(value)}; {remedy}")
+        raise InputError(f"{owner}: {quantity.describe(name)} is {quote(value)}; {remedy}")
     if limit is None or (value is None and type(None) in _members(kind)):
         return
 
@@ -128,7 +128,7 @@ def _check_quantity(owner: str, name: str, value: Any, quantity: Quantity) -> No
     else:
         place, wrong = _locate_beyond(value, limit)
     if place is not None:
-        defect = f"{quantity.named(name)}{place} is {quote(wrong)}"
+        defect = f"{quantity.describe(name)}{place} is {quote(wrong)}"
         raise InputError(f"{owner}: {defect}; {quantity.remedy(number_kind is int)}")
 
 

@@ -141,7 +141,7 @@ def with_open_faces(surface: ContactSurface, v: Array, target: Array) -> Array:
     return target
 
 
-def lumped_entries(surface: ContactSurface, nodal: Array) -> tuple[Indices, Indices, Array]:
+def lump_masses(surface: ContactSurface, nodal: Array) -> tuple[Indices, Indices, Array]:
     """Return (rows, columns, values) of a lumped mass matrix.
 
     It is diagonal, but m G⁻¹ at oblique corners.

@@ -132,7 +132,7 @@ class ContactProblem:
         dual = self.surface.dual
         if basis is None:
             return system
-        known: dict[Any, tuple[Load, SemiDiscreteSystem]] = system.cached("turned", dict)
+        known: dict[Any, tuple[Load, SemiDiscreteSystem]] = system.make_once("turned", dict)
         if (basis, dual) not in known:
             known.clear()  # it takes as much memory as the system
             known[basis, dual] = (system.load, system.in_basis(basis, dual))

@@ -152,7 +152,7 @@ class Quantity:
         """Return the symbol of its unit; "" where it has none, or is a ratio."""
         return "" if self.unit in (None, RATIO) else self.unit.symbol
 
-    def named(self, name: str) -> str:
+    def describe(self, name: str) -> str:
         """Return the words for it in a sentence, its meaning with the unit, or its name.
 
         The unit of an argument without a meaning stands in the remedy.

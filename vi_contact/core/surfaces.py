@@ -58,7 +58,7 @@ class WatchedNodes(Protocol):
     def before_moving(self, towards: Motion | None) -> "WatchedNodes":
         """Return the same nodes before an obstacle that moves towards them, t [s] -> [m]."""
 
-    def carried(self, ground: Callable[[float], Array]) -> "WatchedNodes":
+    def carry(self, ground: Callable[[float], Array]) -> "WatchedNodes":
         """Return the same nodes before an obstacle that the ground carries, t [s] -> (d,) [m]."""
 
 

@@ -153,7 +153,7 @@ class Load:
             inertial=_turn(T, self.inertial),
         )
 
-    def handed_over(self, P: Matrix) -> "Load":
+    def transform_viscous(self, P: Matrix) -> "Load":
         """Return the load that belongs to C* = PᵀCP, with Pᵀ on its viscous parts."""
         return replace(self, viscous=_turn(P, self.viscous))
 
@@ -281,7 +281,7 @@ class SemiDiscreteSystem:
         """Return ½ uᵀ K u [J]."""
         return 0.5 * self.algebra.dot(u, self.K @ u)
 
-    def cached(self, name: str, make: Callable[[], Any], *others: Any) -> Any:
+    def make_once(self, name: str, make: Callable[[], Any], *others: Any) -> Any:
         """Return what ``make`` returned the first time: a factor, or the like.
 
         It lives as long as the system. What depends on the load does not belong here: systems that

@@ -98,7 +98,7 @@ class ImpulseUpdate:
     ) -> Array:
         """Return the velocity after the impulse; the arguments are those of ``VelocityUpdate``."""
         worth = IN_PLANE if surface.points.shape[1] == 2 else 1
-        is_small = system.cached(
+        is_small = system.make_once(
             "small impacts",
             lambda: small(surface.comm, system.rows, surface.count, worth=worth),
             surface,
@@ -128,7 +128,7 @@ def _update_condensed(
     chosen: Indices = np.flatnonzero(~np.isnan(jump))
     if len(chosen) == 0:
         return v
-    flexibility, respond = system.cached(
+    flexibility, respond = system.make_once(
         "impulse update", lambda: _condense_mass(system, surface), surface
     )
     impulse = np.zeros(surface.total)

@@ -126,7 +126,7 @@ class BoundaryLayer(Midpoint):
         old, free, rate, weights = (np.ascontiguousarray(column) for column in values.T)
         pressure = np.zeros(surface.total)
         if min(old.min(), free.min()) < self.law.layer.width:
-            kept: WeakKeyDictionary[EffectiveMatrix, Array] = problem.equations.cached(
+            kept: WeakKeyDictionary[EffectiveMatrix, Array] = problem.equations.make_once(
                 "layer", WeakKeyDictionary
             )
             if A not in kept:  # B A⁻¹ Bᵀ (m, m), made once for every A

@@ -47,7 +47,7 @@ def first_modes(problem: ContactProblem) -> FirstModes:
     """
     check_problem_given("first_modes", problem)
     surface, frictional = problem.surface, problem.frictional
-    known: list[tuple[Any, bool, FirstModes]] = problem.system.cached(KNOWN, list)
+    known: list[tuple[Any, bool, FirstModes]] = problem.system.make_once(KNOWN, list)
     for one, rubbing, modes in known:
         if one is surface and rubbing == frictional:
             return modes
@@ -64,7 +64,7 @@ def damping_in_words(problem: ContactProblem, *, unknown: str = "") -> str:
     law = "; ".join(_sources(system))
     if not law:
         return "none"
-    known: list[tuple[Any, bool, FirstModes]] = system.cached(KNOWN, list)
+    known: list[tuple[Any, bool, FirstModes]] = system.make_once(KNOWN, list)
     for surface, rubbing, modes in known:
         if surface is problem.surface and rubbing == problem.frictional:
             pairs = enumerate(zip(modes.ratios, modes.periods, strict=True), start=1)

@@ -150,7 +150,7 @@ def check_balance(name: str, problem: ContactProblem) -> None:
         )
     if massless or not surface.some(~surface.bilateral & surface.rigid):
         return
-    warnings = problem.equations.cached(f"warnings of {name}", list, surface)
+    warnings = problem.equations.make_once(f"warnings of {name}", list, surface)
     if not warnings and surface.comm.rank == 0:
         log.warning(
             "%s with consistent mass can gain energy whenever a contact opens: leave out "

@@ -113,7 +113,7 @@ def _accelerate_in_contact(
         slip0=slip0,
         rate_factor=dt,
     )
-    solver: PreparedSolver = problem.equations.cached(
+    solver: PreparedSolver = problem.equations.make_once(
         "resting contacts",
         lambda: solver_beside_steps(step.A, step.surface).prepare(step.A, step.surface, 1.0),
         surface,
@@ -131,7 +131,7 @@ def mass_matrix(problem: ContactProblem) -> EffectiveMatrix:
         M = system.M if massless is None else system.algebra.with_identity_rows(system.M, massless)
         return EffectiveMatrix(M, system.algebra)
 
-    return system.cached("mass", make)
+    return system.make_once("mass", make)
 
 
 def without_springs(surface: ContactSurface) -> ContactSurface:
@@ -154,7 +154,7 @@ def equilibrate(problem: ContactProblem, state: State) -> State:
 
     # The block of K of the massless unknowns, under the load that the others leave on them.
     load = system.load(state.t) - system.K @ np.where(layer, 0.0, state.u)
-    A = system.cached(
+    A = system.make_once(
         "massless block",
         lambda: EffectiveMatrix(system.algebra.block(system.K, layer), system.algebra),
     )

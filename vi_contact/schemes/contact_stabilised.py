@@ -134,13 +134,13 @@ def project_predictor(
         return u, closed  # nothing is in the way; NaN is refused by the step itself
 
     # Springs are not bounds here, and nothing rubs.
-    bounds: ContactProblem = system.cached(
+    bounds: ContactProblem = system.make_once(
         "admissible predictor, bounds",
         lambda: replace(problem, surface=without_springs(surface), friction=Frictionless()),
         surface,
     )
     M = mass_matrix(problem)
-    solver: CertifiedSolver = system.cached(
+    solver: CertifiedSolver = system.make_once(
         "admissible predictor",
         lambda: CertifiedSolver(
             bounds, M, 1.0, [solver_beside_steps(M, bounds.surface)], TOLERANCE

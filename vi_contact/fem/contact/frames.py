@@ -316,7 +316,7 @@ def _coupling(
                     start=diagonal,
                 )
             )
-    return algebra.replaced_rows(n, np.concatenate(own), sp.csr_matrix(sp.vstack(entries)))
+    return algebra.replace_identity_rows(n, np.concatenate(own), sp.csr_matrix(sp.vstack(entries)))
 
 
 def _turns(space: NodalSpace, frames: NodalFrames, numbers: Indices) -> Array:

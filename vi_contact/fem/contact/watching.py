@@ -59,7 +59,7 @@ class Watched:
 
         return replace(self, advance=advance)
 
-    def carried(self, ground: Callable[[float], Array]) -> "Watched":
+    def carry(self, ground: Callable[[float], Array]) -> "Watched":
         """Return the same nodes before an obstacle that the ground carries, t [s] -> (d,) [m]."""
         return (
             self

@@ -177,7 +177,7 @@ def _function(
     system = problem.system
     space = space_of(name, problem.system)
     V = (
-        system.cached("scalars", lambda: compat.lagrange(space.mesh, space.degree))
+        system.make_once("scalars", lambda: compat.lagrange(space.mesh, space.degree))
         if nodal.ndim == 1
         else space.V
     )
@@ -187,7 +187,8 @@ def _function(
     found.x.scatter_forward()
     if name == "stress":
         known_matrices("stress", system, "K")
-        found = system.cached(f"stress {continuous}", lambda: Stress(space, continuous))(found, t)
+        stress = system.make_once(f"stress {continuous}", lambda: Stress(space, continuous))
+        found = stress(found, t)
     found.name = name
     return found
 
