@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from .algebra import Array, Comm, Indices, Mask, largest
-from .errors import InputError, ViContactError, of_machine
+from .errors import InputError, ViContactError, is_of_machine
 
 T = TypeVar("T")
 
@@ -421,7 +421,7 @@ def explain_error(name: str, error: Exception) -> str:
     frame = traceback.extract_tb(error.__traceback__)[-1]
     place = f"{Path(frame.filename).name}, line {frame.lineno}"
     ending = f"{name} ended in {type(error).__name__}: {error} ({place})"
-    if of_machine(error):
+    if is_of_machine(error):
         return f"{ending}: the machine refused it"
     if isinstance(error, ViContactError):
         return str(error)

@@ -33,7 +33,7 @@ def are_orthogonal(directions: Array) -> bool:
     return bool(np.all(np.abs(cosines)[pairs] <= PARALLEL))
 
 
-def corner_frame(directions: Array) -> tuple[list[int], Array]:
+def make_corner_frame(directions: Array) -> tuple[list[int], Array]:
     """Return the frame of a node with several contact directions.
 
     Args:
@@ -68,7 +68,7 @@ def corner_frame(directions: Array) -> tuple[list[int], Array]:
     return columns, block
 
 
-def tangent_vectors(normals: Array, nodes: Indices | None) -> Array:
+def make_tangent_vectors(normals: Array, nodes: Indices | None) -> Array:
     """Return the tangents along which slip and r_t are measured, (m, d, d - 1).
 
     Those of a node with several contact directions are the other vectors of its frame.
@@ -81,12 +81,12 @@ def tangent_vectors(normals: Array, nodes: Indices | None) -> Array:
     corners = () if nodes is None else group_same_nodes(nodes)
     for rows in corners:
         if np.linalg.matrix_rank(normals[rows]) == len(rows):  # else two nodes at one place
-            column[rows], blocks[rows] = corner_frame(normals[rows])
+            column[rows], blocks[rows] = make_corner_frame(normals[rows])
     tangents = tangential_columns(column, normals.shape[1])
     return np.take_along_axis(blocks, tangents[:, None, :], axis=2)
 
 
-def oblique_corners(surface: ContactSurface) -> list[Indices]:
+def find_oblique_corners(surface: ContactSurface) -> list[Indices]:
     """Return the conditions of each node with directions that are not at right angles."""
     if surface.dual is None:
         return []
@@ -121,7 +121,7 @@ def with_open_faces(surface: ContactSurface, v: Array, target: Array) -> Array:
         v: velocities (n,) [m/s] before the impact law, or rows (k, n).
         target: normal velocities (m,) [m/s] of closed faces, NaN for open ones; or rows (k, m).
     """
-    corners = oblique_corners(surface)
+    corners = find_oblique_corners(surface)
     if not corners:
         return target
     if v.ndim == 2:
@@ -155,7 +155,7 @@ def lump_masses(surface: ContactSurface, nodal: Array) -> tuple[Indices, Indices
     rows = [diagonal]
     columns = [diagonal]
     values = [own]
-    for corner in oblique_corners(surface):
+    for corner in find_oblique_corners(surface):
         unknowns = surface.owned[corner]
         cosines = surface.normals[corner] @ surface.normals[corner].T
         masses = np.sqrt(np.outer(nodal[unknowns], nodal[unknowns]))

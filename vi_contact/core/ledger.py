@@ -64,7 +64,7 @@ class Energies:
         return self.kinetic + self.strain
 
 
-def energies(system: SemiDiscreteSystem, u: Array, v: Array) -> Energies:
+def compute_energies(system: SemiDiscreteSystem, u: Array, v: Array) -> Energies:
     """Return the energies of a state: two products, unless they are known. Collective.
 
     Args:
@@ -127,8 +127,8 @@ def energy_balance(
     """
     system = problem.equations
     surface = problem.surface
-    before = before or energies(system, old.u, old.v)
-    after = after or energies(system, new.u, new.v)
+    before = before or compute_energies(system, old.u, old.v)
+    after = after or compute_energies(system, new.u, new.v)
     du = new.u - old.u
 
     # What this rank has of each work, and of the difference of the scheme's averages from the mean

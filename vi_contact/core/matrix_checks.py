@@ -23,7 +23,7 @@ def probe(numbers: Any, j: int) -> Array:
     return np.asarray(turns % 1.0 - 0.5)
 
 
-def asymmetry(A: Matrix, comm: Comm, numbers: Indices) -> float:
+def measure_asymmetry(A: Matrix, comm: Comm, numbers: Indices) -> float:
     """Return max |A w - Aᵀ w| / max |A w|, NaN or infinity where A has them. Collective.
 
     Args:
@@ -44,7 +44,9 @@ def asymmetry(A: Matrix, comm: Comm, numbers: Indices) -> float:
         return float(np.float64(error) / scale) if scale else error
 
 
-def matrix_defects(owner: str, comm: Comm, numbers: Indices, **matrices: Matrix) -> Iterator[str]:
+def find_matrix_defects(
+    owner: str, comm: Comm, numbers: Indices, **matrices: Matrix
+) -> Iterator[str]:
     """Yield a sentence for each matrix that is not finite, and for each defect of M.
 
     M must be symmetric and have no masses below zero. Collective: take all sentences on every rank.
@@ -56,7 +58,7 @@ def matrix_defects(owner: str, comm: Comm, numbers: Indices, **matrices: Matrix)
         matrices: the matrices by their names, M among them.
     """
     for name, A in matrices.items():
-        defect = asymmetry(A, comm, numbers)
+        defect = measure_asymmetry(A, comm, numbers)
         if not np.isfinite(defect):
             yield f"{owner}: {name} has NaN or infinite entries; give finite numbers"
         elif defect > SYMMETRIC and name == "M":

@@ -20,7 +20,7 @@ def check_problem_given(owner: str, value: Any) -> None:
     instance(owner, "problem", value, ContactProblem, "give a ContactProblem(system, surface, …)")
 
 
-def start_time(owner: str, state: Any) -> float:
+def read_start_time(owner: str, state: Any) -> float:
     """Return the time of a state [s], 0 for None; InputError for anything else."""
     if state is None:
         return 0.0
@@ -39,7 +39,7 @@ def check_sizes(owner: str, problem: ContactProblem, state: Any) -> None:
         problem: the problem.
         state: the state, which may be anything on any rank.
     """
-    start_time(owner, state)
+    read_start_time(owner, state)
     instance(owner, "state", state, State, "give a state, of static_equilibrium or of a run")
     defects = _find_defects_of_state(problem, state)
     refuse((f"{owner}: {text}" for text in defects), problem.surface.comm)

@@ -31,7 +31,7 @@ from ..core.corners import with_open_faces
 from ..core.free_unknowns import solve_free
 from ..core.protocols import Impact
 from ..core.quantities import RATIO, Between
-from ..core.sizes import small
+from ..core.sizes import is_small_problem
 from ..core.surfaces import ContactSurface
 from ..core.system import SemiDiscreteSystem
 from ..kernels.condensation import condense
@@ -100,7 +100,7 @@ class ImpulseUpdate:
         worth = IN_PLANE if surface.points.shape[1] == 2 else 1
         is_small = system.make_once(
             "small impacts",
-            lambda: small(surface.comm, system.rows, surface.count, worth=worth),
+            lambda: is_small_problem(surface.comm, system.rows, surface.count, worth=worth),
             surface,
         )
         update = _update_condensed if is_small else _update_by_iterations

@@ -14,7 +14,7 @@ from ..core.checks import describe_point, provides, quote, real, several
 from ..core.collective import Parts, agree, together
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
-from ..core.state_checks import check_problem_given, check_sizes, start_time
+from ..core.state_checks import check_problem_given, check_sizes, read_start_time
 from ..core.step import Scheme, Solver, State
 from ..laws.mass import ConsistentMass
 from ..schemes.trapezoidal import Trapezoidal
@@ -100,7 +100,7 @@ def choose_method(
     if first is None:
         first = Automatic()
     method = Method(problem, scheme, [first, *escalation], dt, tolerance)
-    size = step_plan(dt, steps, t_end, start_time(owner, state)).dt(0)
+    size = step_plan(dt, steps, t_end, read_start_time(owner, state)).dt(0)
     with together(comm):  # what is the user's own may fail on one rank
         method.bind()
         problem.equations.forget_loads()

@@ -28,7 +28,7 @@ import numpy as np
 from ..core.algebra import Array, EffectiveMatrix, max_abs
 from ..core.free_unknowns import solve_free
 from ..core.problem import ContactProblem
-from ..core.sizes import small
+from ..core.sizes import is_small_problem
 from ..core.step import PreparedSolver, State, StepProblem
 from ..core.surfaces import ContactSurface
 from ..solvers.automatic import solver_beside_steps
@@ -59,7 +59,7 @@ def consistent_acceleration(
 
     # Massless unknowns are in equilibrium: the force on them is all reaction.
     moving = np.where(system.massless, 0.0, force)
-    if small(system.algebra.comm, system.rows, 0):
+    if is_small_problem(system.algebra.comm, system.rows, 0):
         a = mass_matrix(problem).factor.solve(moving)
     else:
         a = solve_free(system.algebra, system.M, moving, system.massless, np.zeros_like(force))

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..core.algebra import Array, EffectiveMatrix, total
 from ..core.errors import InputError, StepFailure
-from ..core.matrix_checks import SYMMETRIC, asymmetry
+from ..core.matrix_checks import SYMMETRIC, measure_asymmetry
 from ..core.step import StepProblem
 from ..core.surfaces import empty_surface
 from ..fem.matrices.petsc_algebra import PetscAlgebra, PetscMatrix, UnsymmetricAlgebra
@@ -23,7 +23,7 @@ from .judged import Judged
 def is_symmetric(A: PetscMatrix, comm: MpiComm) -> bool:
     """Say whether A is symmetric to round-off. Collective."""
     numbers = PetscAlgebra(comm.mpi).first(A.rows) + np.arange(A.rows)
-    return asymmetry(A, comm, numbers) <= SYMMETRIC
+    return measure_asymmetry(A, comm, numbers) <= SYMMETRIC
 
 
 class LinearSteps:

@@ -18,7 +18,7 @@ import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, Mask, Matrix, largest
 from ...core.checks import describe_point
-from ...core.corners import PARALLEL, are_orthogonal, corner_frame
+from ...core.corners import PARALLEL, are_orthogonal, make_corner_frame
 from ...core.errors import InputError
 from ...core.surfaces import (
     ContactSurface,
@@ -121,7 +121,7 @@ class NodalFrames:
     def _turn_corner(self, slots: Indices) -> None:
         """Give a node with several conditions its frame."""
         node = self.place[slots[0]]
-        self.column[slots], block = corner_frame(self.directions[slots])
+        self.column[slots], block = make_corner_frame(self.directions[slots])
         self.blocks[node] = block
         self.turns[node] = (
             block if are_orthogonal(self.directions[slots]) else np.linalg.inv(block).T

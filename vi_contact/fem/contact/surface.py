@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from ...core.algebra import Array, Indices, from_each, largest, total
 from ...core.checks import array, describe_point, flag, optional, provides, several
 from ...core.collective import agree
-from ...core.corners import FEATURE_ANGLE, PARALLEL, tangent_vectors
+from ...core.corners import FEATURE_ANGLE, PARALLEL, make_tangent_vectors
 from ...core.errors import InputError
 from ...core.obstacles import Obstacle, Touching, admissible_gap, locate_obstacle
 from ...core.surfaces import ContactSurface, tangential_columns
@@ -186,7 +186,7 @@ def moved_by_held(
         np.take_along_axis(free, tangential_columns(frames.column, space.dimension), axis=1)
         & frames.rubs
     )
-    tangents = tangent_vectors(frames.directions, frames.place)
+    tangents = make_tangent_vectors(frames.directions, frames.place)
     directions = frames.directions
     # what conditions face, and shares of it
     faced = [_faced_by(part) for part in conditions]

@@ -22,8 +22,8 @@ from petsc4py import PETSc
 
 from ...core.algebra import Array, Indices
 from ...core.checks import flag, instance, number, optional, quote, refuse
-from ...core.errors import InputError, of_machine
-from ...core.files import FIELDS, FIELDS_INDEX, frames_of, on_root, open_hdf5
+from ...core.errors import InputError, is_of_machine
+from ...core.files import FIELDS, FIELDS_INDEX, list_frames, on_root, open_hdf5
 from ...core.own_files import inner_folder, is_own, read_bytes
 from ...core.problem import ContactProblem
 from ...core.state_checks import check_problem_given, check_sizes
@@ -265,7 +265,7 @@ def _stored(
         )
         time, place = places[_chosen([time for time, _ in places], t, frame)]
         file, path = place.split(":")
-        known = {str(one.relative_to(folder)): one for one, _ in frames_of(folder).values()}
+        known = {str(one.relative_to(folder)): one for one, _ in list_frames(folder).values()}
         with (
             open_hdf5(inner_folder(folder, FIELDS) / "mesh.h5") as mesh,
             open_hdf5(known[file]) as fields,
@@ -282,7 +282,7 @@ def _stored(
         ValueError,
         RuntimeError,
     ) as error:
-        if of_machine(error):
+        if is_of_machine(error):
             raise
         raise InputError(
             f"the fields in '{folder}' are incomplete or damaged ({error}): run again"

@@ -14,8 +14,8 @@ from typing import Any, NoReturn
 
 from ...core.algebra import SerialComm
 from ...core.checks import SHOWN, quote
-from ...core.errors import InputError, ViContactError, of_memory
-from ...core.files import sentence
+from ...core.errors import InputError, ViContactError, is_of_memory
+from ...core.files import describe_os_error
 
 PATIENCE = 30.0  # seconds between the first rank that has failed and the last
 LIBRARIES = ("dolfinx", "ufl", "basix", "petsc4py", "mpi4py", "h5py", "gmsh", "matplotlib", "tqdm")
@@ -66,7 +66,7 @@ def told(run: Callable[[], Any], spelling: Mapping[str, str]) -> Any:
     try:
         return run()
     except ViContactError as error:
-        if of_memory(error):
+        if is_of_memory(error):
             raise ViContactError(OUT_OF_MEMORY) from error
         if spelling and isinstance(error, InputError):
             said = str(error)
@@ -122,10 +122,10 @@ def keep_streams() -> None:
 
 
 def _sentence(error: Exception) -> str | None:
-    if of_memory(error):
+    if is_of_memory(error):
         return OUT_OF_MEMORY
     if isinstance(error, OSError):
-        return sentence(error)
+        return describe_os_error(error)
     if isinstance(error, ModuleNotFoundError) and error.name in LIBRARIES:
         return (
             f"{error.name} is needed and this Python does not find it: install it "

@@ -17,7 +17,7 @@ from ...core.algebra import Array, Indices
 from ...core.arguments import check_arguments
 from ...core.checks import number, optional
 from ...core.errors import InputError
-from ...core.files import frames_of, write_output
+from ...core.files import list_frames, write_output
 from ...run.files.reading import ContactGeometry, RunFolder
 from .deformed import contact_states, nearest, plane_normals, read_frames
 from .faces import (
@@ -331,7 +331,7 @@ def draw_run(
     ``magnified``: how many times larger displacements are drawn, None: so that they are seen.
     """
     drawn, contact, history = [], run.contact, run.history
-    if frames_of(run.folder) and read_frames(run).cells.shape[1] > 2:  # no bars
+    if list_frames(run.folder) and read_frames(run).cells.shape[1] > 2:  # no bars
         drawn.append(
             plot_deformed(
                 run, Path(out) / "deformed.png", times=times, magnified=magnified, title=title

@@ -19,12 +19,12 @@ from scipy.spatial import cKDTree
 from ...core.algebra import Array, Indices
 from ...core.arguments import check_arguments
 from ...core.checks import array
-from ...core.errors import InputError, of_machine
-from ...core.files import FIELDS, frames_of, open_hdf5
+from ...core.errors import InputError, is_of_machine
+from ...core.files import FIELDS, list_frames, open_hdf5
 from ...core.own_files import inner_folder
 from ...meshes.rows import SIDES, connected
 from ...run.files.reading import RunFolder, read_run
-from ...run.recorders.contact_parts import Geometry, tangent_vectors
+from ...run.recorders.contact_parts import Geometry, make_tangent_vectors
 
 OPEN, STICK, SLIP = 1, 2, 3  # as contact_status in fields.xdmf
 SAME = 1e-6  # of the size of what is drawn: what lies at one place or in one plane
@@ -160,7 +160,7 @@ def stored_tangents(contact: Geometry) -> Array:
 
     What is at one place is one node.
     """
-    return tangent_vectors(
+    return make_tangent_vectors(
         contact.normals, np.unique(contact.points, axis=0, return_inverse=True)[1].ravel()
     )
 
@@ -172,7 +172,7 @@ def read_frames(run: RunFolder | str | Path) -> StoredFrames:
     InputError for a folder without them.
     """
     folder = run.folder if isinstance(run, RunFolder) else Path(run)
-    places = frames_of(folder)
+    places = list_frames(folder)
     if places:
         history = run.history if isinstance(run, RunFolder) else read_run(folder).history
         times = dict(zip(history["k"].astype(int).tolist(), history["t"].tolist(), strict=True))
@@ -223,7 +223,7 @@ def _opened(path: Path) -> Iterator[Any]:
         AttributeError,
         RuntimeError,
     ) as error:
-        if of_machine(error):
+        if is_of_machine(error):
             raise
         reason = " ".join(str(error).split())[:200]
         raise InputError(

@@ -12,11 +12,11 @@ from ...core.algebra import Array, Indices
 from ...core.arguments import check_arguments
 from ...core.corners import FEATURE_ANGLE
 from ...core.errors import InputError
-from ...core.files import frames_of
+from ...core.files import list_frames
 from ...core.step import AXES
 from ...meshes.rows import connected
 from ...run.files.reading import RunFolder
-from ...run.recorders.contact_parts import Geometry, tangent_vectors
+from ...run.recorders.contact_parts import Geometry, make_tangent_vectors
 from .deformed import OPEN, SAME, SLIP, STICK, contact_states, nearest, read_frames, stored_tangents
 from .histories import STYLE, History, length_unit, plain, require_matplotlib, save, scale
 
@@ -74,7 +74,7 @@ def faces_of(contact: Geometry, sides: Indices) -> list[Face]:
         own, flat = np.sort(np.concatenate(pieces)), isinstance(key, tuple)
         normal, mine = normals[own[:1]], sides[np.all(np.isin(sides, own), axis=1)]
         name = f"face towards {direction(normal[0])}" if flat else "curved face"
-        axes = tangent_vectors(normal, np.zeros(1, dtype=np.int64))[0] if flat else None
+        axes = make_tangent_vectors(normal, np.zeros(1, dtype=np.int64))[0] if flat else None
         found.append(Face(name, own, points[own], axes, shares(points[mine]), mine.ravel()))
     return found
 
@@ -270,7 +270,7 @@ def plot_faces(
         )
     sides = (
         read_frames(run).facing(contact)[0]
-        if frames_of(run.folder)
+        if list_frames(run.folder)
         else np.zeros((0, 3), dtype=np.int64)
     )
     faces = faces_of(contact, sides)

@@ -10,7 +10,7 @@ from typing import Any
 
 from ...core.arguments import check_arguments
 from ...core.errors import InputError, ViContactError
-from ...core.files import sentence, write_output
+from ...core.files import describe_os_error, write_output
 from ...core.own_files import is_own
 from ...core.version import __version__
 from ...run.files.folder import MODEL
@@ -95,7 +95,7 @@ def _model(folder: Path, picture: Path) -> tuple[dict[str, Any], list[Path]]:
     except InputError:
         raise
     except OSError as error:
-        raise ViContactError(sentence(error)) from error
+        raise ViContactError(describe_os_error(error)) from error
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         # of what the file says
         reason = " ".join(str(error).split())[:200]

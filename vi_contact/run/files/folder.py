@@ -32,16 +32,16 @@ from ...core.files import (
     FIELDS_INDEX,
     FRAME,
     FRAMES,
+    describe_os_error,
     on_root,
-    sentence,
     to_json,
     write_atomically,
 )
 from ...core.own_files import (
+    count_names,
     inner_folder,
     is_own,
     make_inner_folder,
-    names,
     open_lock,
     open_to_read,
     read_text,
@@ -222,7 +222,7 @@ def check_folder_format(folder: Path) -> None:
     try:
         number = json.loads(read_text(folder / ABOUT))["format"]
     except OSError as error:
-        raise InputError(sentence(error)) from error
+        raise InputError(describe_os_error(error)) from error
     except (ValueError, TypeError, KeyError, RecursionError) as error:
         # of json, and of what it has read
         raise InputError(
@@ -376,7 +376,7 @@ def _take(folder: Path, name: str) -> Any:
                 folder,
                 error.strerror,
             )
-        if names(file) > 1 and same_file(folder / name, file):
+        if count_names(file) > 1 and same_file(folder / name, file):
             remove(folder / name)  # its other name, a hard link, keeps what it holds
         if same_file(folder / name, file):
             break

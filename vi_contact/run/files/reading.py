@@ -15,8 +15,8 @@ import numpy as np
 from ...core.algebra import Array, Mask
 from ...core.arguments import check_arguments
 from ...core.checks import SHOWN, quote
-from ...core.errors import InputError, of_machine
-from ...core.files import open_hdf5, sentence
+from ...core.errors import InputError, is_of_machine
+from ...core.files import describe_os_error, open_hdf5
 from ...core.hdf5 import StoredFile
 from ...core.own_files import is_own, open_to_read, read_bytes
 from .folder import COLUMNS, HISTORY_CSV, HISTORY_H5, SUMMARY, check_folder_format
@@ -112,7 +112,7 @@ def _read_file(path: Path, read: Callable[[Path], T]) -> T:
         raise
     except (OSError, ValueError, KeyError, TypeError, RuntimeError, AttributeError) as error:
         # of json and h5py
-        if of_machine(error):
+        if is_of_machine(error):
             raise
         raise InputError(
             f"a file of the run, '{path}', is missing or damaged ({_short(error)}): restore it"
@@ -196,7 +196,7 @@ def _numbers(path: Path) -> dict[str, Array]:
     except InputError:
         raise
     except OSError as error:
-        raise InputError(sentence(error)) from error
+        raise InputError(describe_os_error(error)) from error
     except ValueError as error:
         raise InputError(
             f"'{path}' is damaged ({_short(error)}): restore it or run again"
