@@ -28,7 +28,7 @@ from ...core.algebra import Array, Indices, Mask
 from ...core.collective import limit_of, slope_of
 from ...core.step import StepProblem
 from ...core.surfaces import ContactSurface
-from .contact import Contact
+from .contact import ClosedSet
 
 # kappa over c at most: at the solution kappa multiplies zero, and the matrix stays well conditioned
 STIFFEST = 1e6
@@ -180,7 +180,7 @@ class States:
         across = self.kappa[:, None] * p
         return across + ((self._rise - self.kappa) * along)[:, None] * self.direction
 
-    def apply(self, contact: Contact, p: Array, y: Array) -> None:
+    def apply(self, contact: ClosedSet, p: Array, y: Array) -> None:
         """Make of y = A p the product of p with the matrix of the linear problem, in place.
 
         Args:
