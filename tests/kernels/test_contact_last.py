@@ -84,13 +84,13 @@ def test_parts_beside_dense_algebra(name: str, short: float, monkeypatch: Any) -
         assert np.abs(found - expected).max(initial=0.0) <= limit * np.abs(inverse).max() * len(b)
 
     near(factor.solve(b), inverse @ b)
-    near(factor.free(factor.forward(b)), (inverse @ b)[c])
+    near(factor.solve_corner(factor.forward(b)), (inverse @ b)[c])
     wanted = np.linspace(-1.0, 1.0, len(c))
     x = factor.backward(wanted)
     assert np.array_equal(x[c], wanted)
     near(x[i], np.linalg.solve(dense[np.ix_(i, i)], b[i] - dense[np.ix_(i, c)] @ wanted))
-    factor.unloaded()
-    near(factor.backward(factor.free(factor.reduced(wanted))), inverse[:, c] @ wanted)
+    factor.forget_load()
+    near(factor.backward(factor.solve_corner(factor.reduce(wanted))), inverse[:, c] @ wanted)
 
 
 def test_matrices_that_are_not_positive_definite_are_left_to_others() -> None:

@@ -24,7 +24,8 @@ from scipy.linalg import blas
 from ..core.algebra import Array, Indices
 from .compiler import addresses
 
-FORWARD, BACKWARD = 4, 5  # CHOLMOD_L and CHOLMOD_Lt of cholmod.h
+FORWARD = 4  # CHOLMOD_L of cholmod.h: a substitution with L
+BACKWARD = 5  # CHOLMOD_Lt: one with Lᵀ
 FEW_ROWS = 5_000  # below, minimum degree fills as little as METIS, in a quarter of the time
 AT_ONCE = 8  # loads that are substituted together
 # entries of L a column: 2D has fewer, and is substituted column by column, 3D by supernodes
@@ -65,15 +66,22 @@ class ContactLast:
             ArithmeticError: A is not positive definite, or too large for 32 bits.
         """
         A = _with_short_indices(A)
-        self._library, self._whole, self._mine = library, whole, mine
+        self._library = library
+        self._whole = whole
+        self._mine = mine
         self.rows = A.shape[0]
-        self._inner = inner = self.rows - len(last)
+        inner = self.rows - len(last)
+        self._inner = inner
         self._order = _order(library, A, np.asarray(last))
         factor = _factorise(library, A, self._order)
         self._y = np.zeros(self.rows)
         self._c = self._y[inner:]  # a view: y_c, or x_c between the substitutions
         self._many = np.zeros(0)
         self.corner: Array = np.zeros((len(last), len(last)), order="F")
+
+        # Short columns of L are copied out of CHOLMOD's supernodes, which are then freed: without
+        # the zeros that supernodes store a substitution reads less memory. Long columns stay where
+        # they are, as dense blocks are faster there; only the corner is copied.
         entries = library.columns(factor, inner, None, None, None, None)
         self._columns: tuple[NDArray[Any], ...] = ()
         if entries <= SHORT_COLUMNS * max(inner, 1):
@@ -96,14 +104,20 @@ class ContactLast:
         self._arguments = (self._inner, *addresses(starts, rows, values, self._y))
 
     def forward(self, b: Array) -> Array:
-        """Return y_c of the load b; y_i is kept for ``backward``. Collective."""
+        """Return y_c of the load b; y_i is kept for ``backward``. Collective.
+
+        Args:
+            b: owned entries (n,) of a load, or rows (k, rows) of several on one rank.
+        """
         if b.ndim == 2:
             return self._forward_many(b)
         load = b if self._whole is None else self._whole(b)
         load.take(self._order, out=self._y, mode="clip")
         if self._columns:
+            # It substitutes with the columns of i. What is left at c is still a load on the
+            # condensed matrix: the corner comes after it.
             self._library.forward(*self._arguments)
-            return self.reduced(self._c)
+            return self.reduce(self._c)
         self._substitute(FORWARD)
         return self._c.copy()
 
@@ -111,10 +125,14 @@ class ContactLast:
         """Return x, the owned entries, whose contact unknowns are exactly x_c.
 
         The other unknowns are in equilibrium with them under the load of the last ``forward``.
+
+        Args:
+            x_c: (m,) values of c, or rows (k, m) after ``forward`` of as many loads.
         """
         if x_c.ndim == 2:
             return self._backward_many(x_c)
         if self._columns:
+            # The compiled function starts above the corner: it reads x_c and leaves it as it is.
             self._c[:] = x_c
             self._library.backward(*self._arguments)
         else:
@@ -126,17 +144,17 @@ class ContactLast:
         x[self._order] = self._y
         return x if self._whole is None else x[self._mine].copy()
 
-    def unloaded(self) -> None:
+    def forget_load(self) -> None:
         """Forget the load: that of the next ``backward`` is zero."""
         self._y[:] = 0.0
 
-    def free(self, y_c: Array) -> Array:
+    def solve_corner(self, y_c: Array) -> Array:
         """Return x_c = L_cc⁻ᵀ y_c."""
         if y_c.ndim == 2:
             return _multiply_rows(blas.dtrsm, self.corner, y_c, trans=1)
         return np.asarray(blas.dtrsv(self.corner, y_c, lower=1, trans=1)) if len(y_c) else y_c
 
-    def reduced(self, r_c: Array) -> Array:
+    def reduce(self, r_c: Array) -> Array:
         """Return L_cc⁻¹ r_c, by which a force on the contact unknowns changes y_c."""
         if r_c.ndim == 2:
             return _multiply_rows(blas.dtrsm, self.corner, r_c)
@@ -144,7 +162,7 @@ class ContactLast:
 
     def solve(self, b: Array) -> Array:
         """Return A⁻¹ b. Collective."""
-        return self.backward(self.free(self.forward(b)))
+        return self.backward(self.solve_corner(self.forward(b)))
 
     def _substitute(self, system: int, y: Array | None = None) -> None:
         """Substitute by supernodes, forward or backward, in place."""
@@ -159,6 +177,9 @@ class ContactLast:
             self._many = np.take(b, self._order, axis=1)
             self._substitute(FORWARD, self._many)
             return self._many[:, self._inner :].copy()
+
+        # Room for the loads side by side, in groups of ``AT_ONCE``, the last of which may be partly
+        # empty.
         room = self.rows * AT_ONCE * (1 + len(b) // AT_ONCE)
         if self._many.size != room:
             self._many = np.empty(room)
@@ -166,7 +187,7 @@ class ContactLast:
         b = np.ascontiguousarray(b)
         y_c = np.empty((len(b), len(self._c)))
         self._library.forward_many(len(b), *self._constant, *addresses(b, self._many, y_c))
-        return self.reduced(y_c)
+        return self.reduce(y_c)
 
     def _backward_many(self, x_c: Array) -> Array:
         """Return x (k, rows) with contact unknowns x_c (k, m), on one rank."""
@@ -183,7 +204,14 @@ class ContactLast:
 
 
 def _multiply_rows(routine: Any, corner: Array, rows: Array, trans: int = 0) -> Array:
-    """Return what a routine of BLAS makes of the triangle and of every row."""
+    """Return what a routine of BLAS makes of the triangle and of every row.
+
+    Args:
+        routine: dtrsm, which solves, or dtrmm, which multiplies.
+        corner: lower triangular (m, m).
+        rows: (k, m).
+        trans: 1 for the transposed triangle.
+    """
     if not rows.size:
         return rows.copy()
     return np.asarray(routine(1.0, corner, rows.T, lower=1, trans_a=trans).T)

@@ -153,12 +153,12 @@ def _condense_mass(
     columns = []
     room = STORED * total(comm, system.rows)
     for impulse in np.eye(surface.total):
-        column = condensed.response(impulse)
+        column = condensed.respond(impulse)
         column[np.abs(column) < NEGLIGIBLE * largest(comm, max_abs(column))] = 0.0
         columns.append(sp.csr_matrix(column))
         room -= total(comm, columns[-1].nnz)
         if room < 0:
-            return condensed.flexibility, condensed.response
+            return condensed.flexibility, condensed.respond
     stored = sp.csr_matrix(sp.vstack(columns).T) if columns else sp.csr_matrix((system.rows, 0))
     return condensed.flexibility, lambda impulse: np.asarray(stored @ impulse)
 

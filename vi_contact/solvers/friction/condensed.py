@@ -63,14 +63,14 @@ class CondensedFriction:
 
         # The row of a prescribed tangent is that of a spring as soft as the normal of its node.
         d = 1 + surface.tangents.shape[1]
-        prescribed = np.flatnonzero(~condensed.there)
+        prescribed = np.flatnonzero(~condensed.movable)
         normal = prescribed // d * d
         self.delassus[prescribed, prescribed] = self.delassus.diagonal()[normal]
         self._small = method.prepare(self.delassus, surface.everywhere(surface.bilateral))
 
     def solve(self, step: StepProblem, rigid: Mask) -> StepResult:
         """Return the answer to a step; ``rigid`` (m,) says which supports are. Collective."""
-        answer, held, values = self.reactions(step, self.condensed.free(step.b), rigid)
+        answer, held, values = self.reactions(step, self.condensed.find_free_motion(step.b), rigid)
         x = self.condensed.answer(answer.r.ravel(), held, values)
         mine = self._surface.slots
         r = answer.r[mine]
@@ -141,7 +141,7 @@ class CondensedFriction:
             own: makes the step of one row.
             rigid: (m,) which supports are.
         """
-        free = self.condensed.free(many.b)
+        free = self.condensed.find_free_motion(many.b)
         k = len(free)
         m = len(many.bound)
         d = 1 + self._surface.tangents.shape[1]
