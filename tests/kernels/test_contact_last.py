@@ -112,8 +112,9 @@ def cold(tmp_path: Path, monkeypatch: Any) -> Any:
 
 def forget() -> None:
     """Ask for compiled functions anew."""
-    for one in (compiler._loops, compiler._with_cholmod, compiler._without_cholmod):
-        one.cache_clear()
+    compiler._load_own_loops.cache_clear()
+    compiler._compile_with_cholmod.cache_clear()
+    compiler._report_no_cholmod.cache_clear()
 
 
 @pytest.fixture
@@ -148,7 +149,7 @@ def test_without_it_today_s_factor_serves_and_the_log_says_so_once(
         said = "there is no C compiler that works"
     elif how == "no header":
         monkeypatch.setattr(
-            compiler, "cholmod_of_petsc", lambda: Path("/nowhere/lib/libcholmod.so.3")
+            compiler, "locate_cholmod_of_petsc", lambda: Path("/nowhere/lib/libcholmod.so.3")
         )
         said = "there is no header cholmod.h beside /nowhere/lib/libcholmod.so.3"
     elif how == "no CHOLMOD":
@@ -202,7 +203,7 @@ def test_a_cholmod_of_another_version_than_its_header_is_left_alone(
     """Structures change between versions: the compiled file itself compares."""
     if not packages.petsc_has("cholmod"):
         pytest.skip("PETSc has no CHOLMOD here")
-    header = compiler._header(compiler.cholmod_of_petsc()) / "cholmod.h"
+    header = compiler._locate_header_folder(compiler.locate_cholmod_of_petsc()) / "cholmod.h"
     other = tmp_path / "cholmod.h"
     other.write_text(
         f'#include "{header}"\n#undef CHOLMOD_SUB_VERSION\n#define CHOLMOD_SUB_VERSION 99\n'

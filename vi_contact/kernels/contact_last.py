@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.linalg import blas
 
 from ..core.algebra import Array, Indices
-from .compiler import addresses
+from .compiler import locate_arrays
 
 FORWARD = 4  # CHOLMOD_L of cholmod.h: a substitution with L
 BACKWARD = 5  # CHOLMOD_Lt: one with Lᵀ
@@ -88,7 +88,7 @@ class ContactLast:
             self._copy_columns(factor, entries)
             library.release(factor)
         else:
-            library.columns(factor, inner, None, None, None, *addresses(self.corner))
+            library.columns(factor, inner, None, None, None, *locate_arrays(self.corner))
             self._factor = factor
             weakref.finalize(self, library.release, factor)
         self.bytes = 12.0 * entries + 8.0 * self.corner.size
@@ -98,10 +98,10 @@ class ContactLast:
         starts = np.empty(self._inner + 1, np.int64)
         rows = np.empty(entries, np.int32)
         values = np.empty(entries)
-        to = addresses(starts, rows, values, self.corner)
+        to = locate_arrays(starts, rows, values, self.corner)
         self._library.columns(factor, self._inner, *to)
         self._columns = starts, rows, values
-        self._arguments = (self._inner, *addresses(starts, rows, values, self._y))
+        self._arguments = (self._inner, *locate_arrays(starts, rows, values, self._y))
 
     def forward(self, b: Array) -> Array:
         """Return y_c of the load b; y_i is kept for ``backward``. Collective.
@@ -167,7 +167,7 @@ class ContactLast:
     def _substitute(self, system: int, y: Array | None = None) -> None:
         """Substitute by supernodes, forward or backward, in place."""
         y = self._y if y is None else y
-        (place,) = addresses(y)
+        (place,) = locate_arrays(y)
         if self._library.substitute(self._factor, system, y.size // self.rows, place):
             raise MemoryError("CHOLMOD has no memory left for a substitution")
 
@@ -183,10 +183,10 @@ class ContactLast:
         room = self.rows * AT_ONCE * (1 + len(b) // AT_ONCE)
         if self._many.size != room:
             self._many = np.empty(room)
-            self._constant = (self.rows, *self._arguments[:-1], *addresses(self._order))
+            self._constant = (self.rows, *self._arguments[:-1], *locate_arrays(self._order))
         b = np.ascontiguousarray(b)
         y_c = np.empty((len(b), len(self._c)))
-        self._library.forward_many(len(b), *self._constant, *addresses(b, self._many, y_c))
+        self._library.forward_many(len(b), *self._constant, *locate_arrays(b, self._many, y_c))
         return self.reduce(y_c)
 
     def _backward_many(self, x_c: Array) -> Array:
@@ -194,7 +194,7 @@ class ContactLast:
         x_c = np.ascontiguousarray(x_c)
         x = np.empty((len(x_c), self.rows))
         if self._columns:
-            self._library.backward_many(len(x), *self._constant, *addresses(x_c, self._many, x))
+            self._library.backward_many(len(x), *self._constant, *locate_arrays(x_c, self._many, x))
             return x
         self._many[:, self._inner :] = _multiply_rows(blas.dtrmm, self.corner, x_c, trans=1)
         self._substitute(BACKWARD, self._many)
@@ -225,10 +225,10 @@ def _order(library: Any, A: sp.csr_matrix, last: Indices) -> NDArray[np.int32]:
     number = np.full(len(is_inner), -1, dtype=np.int32)  # among the inner rows
     number[inner] = np.arange(len(inner))
     order = np.empty(len(inner), dtype=np.int32)
-    arrays = addresses(A.indptr, A.indices, number)
+    arrays = locate_arrays(A.indptr, A.indices, number)
     dissect = len(is_inner) > FEW_ROWS
     for by_metis in (dissect, False):  # a CHOLMOD without METIS has minimum degree
-        if not library.order(len(is_inner), *arrays, by_metis, *addresses(order)):
+        if not library.order(len(is_inner), *arrays, by_metis, *locate_arrays(order)):
             return np.concatenate([inner[order], last]).astype(np.int32)
     raise ArithmeticError("CHOLMOD cannot order the matrix")
 
@@ -236,7 +236,7 @@ def _order(library: Any, A: sp.csr_matrix, last: Indices) -> NDArray[np.int32]:
 def _factorise(library: Any, A: sp.csr_matrix, order: NDArray[np.int32]) -> Any:
     """Return the factor, an object of the library."""
     factor = ctypes.c_void_p()
-    arrays = addresses(A.indptr, A.indices, A.data, order)
+    arrays = locate_arrays(A.indptr, A.indices, A.data, order)
     is_finite = np.isfinite(A.data).all()
     if not is_finite or library.factorise(len(order), *arrays, ctypes.byref(factor)):
         raise ArithmeticError("CHOLMOD cannot factorise the matrix")
