@@ -70,8 +70,8 @@ class Exchanges:
             q: (k, m) or (m,), gaps without reactions.
             guess: (k, m) or (m,), the sets to start from, True where r may be above zero.
         """
-        # The C function reads and fills the arrays of this object, whose addresses it was given once:
-        # for small problems looking them up would take longer than the exchanges.
+        # The C function reads and fills the arrays of this object, whose addresses were noted once:
+        # to look them up takes longer than the exchanges of a small problem.
         k = len(q) if q.ndim == 2 else 1
         if k > self._rows:
             self._make_room(k)
