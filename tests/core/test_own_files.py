@@ -133,7 +133,7 @@ def test_hard_links_are_parted(tmp_path: Path, notes: Path) -> None:
         path = tmp_path / name
         os.link(notes, path)
         with write(path) as file:
-            assert own_files.names(file) == 1
+            assert own_files.count_names(file) == 1
             file.write(b", and more")
         assert path.read_bytes() == (NOTES if name == "continued" else b"") + b", and more"
     assert notes.read_bytes() == NOTES
@@ -167,7 +167,7 @@ def test_a_file_that_was_removed_is_another(tmp_path: Path) -> None:
     with own_files.open_lock(tmp_path / "lock") as file:
         assert own_files.same_file(tmp_path / "lock", file)
         (tmp_path / "lock").unlink()
-        assert not own_files.same_file(tmp_path / "lock", file) and own_files.names(file) == 0
+        assert not own_files.same_file(tmp_path / "lock", file) and own_files.count_names(file) == 0
         (tmp_path / "lock").write_text("")
         assert not own_files.same_file(tmp_path / "lock", file)
 

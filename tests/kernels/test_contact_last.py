@@ -208,7 +208,7 @@ def test_a_cholmod_of_another_version_than_its_header_is_left_alone(
     other.write_text(
         f'#include "{header}"\n#undef CHOLMOD_SUB_VERSION\n#define CHOLMOD_SUB_VERSION 99\n'
     )
-    monkeypatch.setattr(compiler, "_header", lambda file: tmp_path)
+    monkeypatch.setattr(compiler, "_locate_header_folder", lambda file: tmp_path)
     monkeypatch.setattr(compiler, "LOOPS", [small])
     forget()
     assert load_cholmod(SerialComm()) is None
