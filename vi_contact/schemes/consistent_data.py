@@ -76,6 +76,9 @@ def _accelerate_in_contact(
         state: the state.
         force: f - C v - K u (n,) [N].
         dt: size of the next step [s].
+
+    Returns:
+        As ``consistent_acceleration``.
     """
     surface = problem.surface
     rigid = surface.rigid
@@ -99,6 +102,8 @@ def _accelerate_in_contact(
         if sliding is not None:
             rate = rate - sliding / dt
         slip0 = -rate / dt
+
+    # M a = force - springs - Bᵀr is a step with x = a: the bound a_n <= 0 holds on resting points.
     step = StepProblem(
         A=mass_matrix(problem),
         b=force - springs,
@@ -179,6 +184,8 @@ def equilibrate(problem: ContactProblem, state: State) -> State:
         friction=problem.friction,
         slip0=problem.slip_origin(state.u, state.t, state.t),
     )
+
+    # Solve it as any step, and put the answer into the massless unknowns alone.
     solvers = [solver_beside_steps(A, surface)]
     certified = CertifiedSolver(problem, A, 1.0, solvers, TOLERANCE, surface=surface)
     result, _, _ = certified.solve(step)
