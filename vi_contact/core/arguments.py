@@ -3,6 +3,12 @@
 ``@check_arguments`` is for functions that users call with their own values, and that look at these
 before any other function does; ``check_fields`` is for dataclasses. Both check the limits of
 numbers that annotations mark: ``core.quantities``.
+
+``fits`` is the heart: it looks a type up in two tables, ``_SIMPLE`` and ``_MADE_OF`` at the end of
+the file, and asks what a value is made of by itself. Types are read as a user means them: ``float``
+takes whole numbers, ``int`` takes 3.0 and not True, a tuple or an array may come as a list, and an
+array of numbers as anything that numpy makes one of. ``describe_type`` has the words of each type
+for the sentence.
 """
 
 import math
@@ -35,7 +41,9 @@ def check_arguments(function: Callable[P, R]) -> Callable[P, R]:
     its annotation marks (``core.quantities``).
     """
     owner = function.__qualname__
-    get_parameters = cache(lambda: _read_parameters(function))  # classes may follow
+    # Annotations are read at the first call and not here: they may name classes that come later in
+    # the module.
+    get_parameters = cache(lambda: _read_parameters(function))
 
     @wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -180,7 +188,13 @@ def _locate_beyond(value: Any, limit: Between) -> tuple[str | None, Any]:
 
 
 def fits(value: Any, kind: Any) -> bool:
-    """Return whether a value is of a type; every value is of a type that is not understood."""
+    """Return whether a value is of a type; every value is of a type that is not understood.
+
+    Args:
+        value: what the user gave.
+        kind: the type, as an annotation has it, without marks.
+    """
+    # Of list[int], for example, the origin is list, and int stands inside.
     origin = typing.get_origin(kind)
     inside = typing.get_args(kind)
     if kind is Any:
@@ -206,7 +220,13 @@ def _fits_one_of(value: Any, kinds: tuple[Any, ...]) -> bool:
 
 
 def _fits_object(value: Any, kind: Any, origin: Any) -> bool:
-    """Return whether a value is a function, satisfies a protocol, or is of a class."""
+    """Return whether a value is a function, satisfies a protocol, or is of a class.
+
+    Args:
+        value: what the user gave.
+        kind: a type that is in no table.
+        origin: the type without its brackets; None where it has none.
+    """
     if kind is Callable or origin is Callable:
         return callable(value) and not isclass(value)
     protocol = kind if origin is None else origin  # without what stands in its brackets
@@ -217,7 +237,7 @@ def _fits_object(value: Any, kind: Any, origin: Any) -> bool:
 
 
 def describe_type(kind: Any) -> str:
-    """Return the words for a type in a sentence."""
+    """Return the words for a type in a sentence, such as "whole numbers in a list or None"."""
     origin = typing.get_origin(kind)
     inside = typing.get_args(kind)
     if _is_union(kind):
@@ -311,6 +331,7 @@ def _fits_mapping(value: Any, inside: tuple[Any, ...]) -> bool:
     return all(fits(key, inside[0]) and fits(value[key], inside[1]) for key in value)
 
 
+# Type -> whether a value is of it.
 _SIMPLE: dict[Any, Callable[[Any], bool]] = {
     float: _is_number,
     int: _is_whole,
@@ -318,6 +339,7 @@ _SIMPLE: dict[Any, Callable[[Any], bool]] = {
     bool: lambda value: isinstance(value, bool | np.bool_),
     np.ndarray: _are_numbers,
 }
+# Type without its brackets -> whether a value is of it, given the types inside the brackets.
 _MADE_OF: dict[Any, Callable[[Any, tuple[Any, ...]], bool]] = {
     np.ndarray: lambda value, _: _are_numbers(value),
     tuple: _fits_tuple,

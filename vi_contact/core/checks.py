@@ -2,7 +2,18 @@
 
 Every constructor and every entry point of the package asks here, before any work is done. A check
 returns the value in the type that the caller goes on with, so that one line reads and checks an
-argument.
+argument:
+
+    dt = number("march", "dt", dt, positive=True, unit="s")
+
+Such a check is named by what it returns, as ``float`` and ``int`` are: ``number``, ``whole``,
+``flag``, ``array`` and the like. Its first arguments are ``owner``, who asks; ``meaning``, what the
+value is in words; and the value. Together they make the sentence "owner: meaning is value; give …".
+A check that returns nothing is a verb. Arguments whose limits stand in annotations are
+checked by ``core.arguments`` instead.
+
+``refuse`` and ``on_all`` raise on all ranks what is wrong on one: otherwise the others would wait
+for ever in the next collective call.
 """
 
 import math
@@ -20,7 +31,7 @@ from .errors import InputError, ViContactError, is_of_machine
 
 T = TypeVar("T")
 
-SHOWN = 60  # characters of a value in a sentence
+SHOWN = 60  # characters of a value in a sentence, at most
 LARGEST = 50_000_000  # numbers in one array that an input may ask for: 400 MB
 MOST_CELLS = 20_000_000  # of a mesh made here: Gmsh takes some kilobytes for each
 LARGEST_WHOLE = 2.0**53  # beyond it not every whole number is a float
@@ -56,6 +67,7 @@ def number(
     if unit:
         wanted += f" in {unit}"
 
+    # NaN stands for what is no number, and is refused as such.
     result = real(value)
     too_low = (positive and result <= 0.0) or (not_negative and result < 0.0)
     if too_low or not math.isfinite(result):
@@ -249,9 +261,12 @@ def array(
     Raises:
         InputError: other shapes, what are no real numbers, NaN and infinite values.
     """
+    # The shape in words, as numpy writes it, with "any" for any length.
     lengths = ", ".join("any" if n is None else str(n) for n in shape)
     wanted = f"({lengths},)" if len(shape) == 1 else f"({lengths})"
     unit = f" in {unit}" if unit else ""
+
+    # First the type: numpy raises for lists of different lengths, and makes objects of the rest.
     try:
         raw = np.asarray(value)
         if raw.dtype.kind not in "iuf":
@@ -261,6 +276,8 @@ def array(
         raise InputError(
             f"{owner}: {meaning} is {quote(value)}; give real numbers of shape {wanted}{unit}"
         ) from None
+
+    # Then the shape, and last the values, so that the sentence names the first thing to put right.
     if values.ndim != len(shape) or any(
         n is not None and n != m for n, m in zip(shape, values.shape, strict=True)
     ):
@@ -403,6 +420,7 @@ def refuse(defects: Iterable[str], comm: Comm) -> None:
         defects: texts of this rank, "" for no defect.
         comm: the ranks that are asked.
     """
+    # One number tells all ranks whether there is any text; only then are texts sent.
     mine = next((text for text in defects if text), "")
     if largest(comm, bool(mine)):
         texts = comm.bcast(comm.gather(mine))
@@ -439,6 +457,7 @@ def on_all(comm: Comm, name: str, call: Callable[[], T]) -> T:
     Raises:
         InputError: on all ranks, where the call raises on one.
     """
+    # The answer stands in a list, as it may be None itself.
     results = []
     failure = None
     try:
