@@ -276,8 +276,8 @@ class ContactSurface:
             rows: number of unknowns that this rank owns.
             r_t: tangential reactions (m, d - 1) [N], or rows (k, m, d - 1), None without friction.
         """
-        # Entries are set and not added, as an unknown belongs to one condition. The transposed views
-        # let one statement serve a vector and rows of vectors.
+        # Entries are set and not added, as an unknown belongs to one condition. The transposed
+        # views let one statement serve a vector and rows of vectors.
         load = np.zeros((*r_n.shape[:-1], rows))
         load.T[self.owned] = r_n.T
         if r_t is not None:
