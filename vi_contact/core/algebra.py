@@ -187,7 +187,7 @@ class Algebra(Protocol):
         """
 
     def factor(self, A: Matrix) -> Factor:
-        """Return a factor of A."""
+        """Return a factor of A. Collective."""
 
     def contact_last(self, A: Matrix, last: Indices) -> Any:
         """Return a factor with some unknowns last, a ``kernels.contact_last.ContactLast``.
@@ -244,7 +244,12 @@ class EffectiveMatrix:
         return self._last[1]
 
     def share_factors(self, other: "EffectiveMatrix") -> "EffectiveMatrix":
-        """Return this matrix with the factors of another, whose entries are the same."""
+        """Return this matrix with the factors of another, whose entries are the same.
+
+        Args:
+            other: a matrix that has been used already; factors that it has not made yet are not
+                shared.
+        """
         self._last = other._last
         if other.factorised:
             self.__dict__["factor"] = other.factor
@@ -440,6 +445,9 @@ def upper_blocks(rows: sp.csr_matrix, width: int, first: int) -> tuple[Indices, 
     counts = [np.zeros(1, dtype=np.int64)]
     columns = [rows.indices[:0]]
     values = [np.zeros((0, width, width))]
+
+    # Some nodes at a time, so that the blocks of their whole rows need little memory: of these only
+    # the upper ones are kept, those from the diagonal block on.
     for start in range(0, rows.shape[0], BATCH * width):
         blocks = rows[start : start + BATCH * width].tobsr((width, width))
         # The blocks come in the order in which the rows of a node name them; PETSc counts on
@@ -464,6 +472,7 @@ def build_identity_with_rows(
         entries: (k, columns) what stands in them.
         first: column in which row 0 of the identity has its one.
     """
+    # Entries as (row, column, value): those of the identity first, then those that replace it.
     others = np.setdiff1d(np.arange(n), rows)
     row = np.concatenate([others, np.repeat(rows, np.diff(entries.indptr))])
     column = np.concatenate([first + others, entries.indices])

@@ -141,7 +141,7 @@ def _check_quantity(owner: str, name: str, value: Any, quantity: Quantity) -> No
 
 
 def _holds(value: Any, limit: Between, kind: type) -> bool:
-    """Return whether a value is a number, or a whole one where ``kind`` is int, within a limit."""
+    """Return whether a value is a number within a limit, and a whole one where ``kind`` is int."""
     number = real(value)
     return limit.holds(number) and (kind is float or number == math.floor(number))
 
@@ -250,6 +250,7 @@ def describe_type(kind: Any) -> str:
         return "a path"
     if origin is np.ndarray:
         return "real numbers in a list or array"
+    # A tuple of some length, of one type or of several; with an ellipsis of any length.
     if origin is tuple:
         count = "" if inside[-1] is Ellipsis else f"{len(inside)} "
         if len(set(inside) - {Ellipsis}) == 1:

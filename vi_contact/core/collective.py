@@ -249,6 +249,8 @@ def _describe(value: Any, depth: int, parts: bool = False) -> str:
         parts: whether each rank may hold its part of lists and arrays.
     """
     kind = f"{type(value).__module__}.{type(value).__qualname__}"
+
+    # Single values: their text, where 1 and 1.0 are the same number.
     if isinstance(value, Parts):
         return _describe(value.value, depth, parts=True)
     if isinstance(value, Enum):
@@ -258,6 +260,8 @@ def _describe(value: Any, depth: int, parts: bool = False) -> str:
     if isinstance(value, int | float | complex | np.number):
         number: Any = value
         return repr(complex(number)) if abs(number) < EXACT else repr(number)
+
+    # Values made of others: the texts of these; of functions and all other objects the type.
     if depth == 0:
         return kind
     if isinstance(value, list | tuple | np.ndarray):

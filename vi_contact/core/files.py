@@ -94,6 +94,8 @@ def on_root(comm: Comm, action: Callable[[], T]) -> T | None:
 def describe_os_error(error: OSError) -> str:
     """Return one sentence: what happened to which file, and the remedy."""
     path = "a file" if error.filename is None else f"'{os.fsdecode(error.filename)}'"
+
+    # Causes with a remedy of their own come first.
     if error.errno in _FULL:
         return (
             f"the disk is full: {path} could not be written; what was written before is kept, free "

@@ -49,6 +49,7 @@ class StoredGroup:
         """Return a group or data set of this group; its link is checked before it is followed."""
         import h5py  # late: no step needs it
 
+        # The link itself is asked for and not followed: a soft or external one leads elsewhere.
         link = self._group.get(name, getlink=True)
         if link is None:
             raise KeyError(name)
@@ -59,6 +60,8 @@ class StoredGroup:
             return StoredGroup(self._path, item, self._size)
         if not isinstance(item, h5py.Dataset):
             raise self._damage(name, "is no array of numbers of this file")
+
+        # Numbers that are stored in other files, or more of them than this file can have packed.
         if item.external is not None or item.is_virtual:
             raise self._damage(name, "lies in another file")
         if item.dtype.kind not in _NUMBERS or item.nbytes > DENSEST * self._size:

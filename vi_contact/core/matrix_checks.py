@@ -18,7 +18,15 @@ GOLDEN = 0.6180339887498949
 
 
 def probe(numbers: Any, j: int) -> Array:
-    """Return values between -1/2 and 1/2 at these whole numbers; each j gives others."""
+    """Return values between -1/2 and 1/2 at these whole numbers; each j gives others.
+
+    Multiples of the golden ratio, without their whole part, never repeat: products with them meet
+    every entry of a matrix, and are the same on any number of ranks.
+
+    Args:
+        numbers: (n,) those of the owned unknowns.
+        j: 0, 1, … for different vectors.
+    """
     turns = np.asarray(numbers, dtype=float) * (GOLDEN / (j + 1))
     return np.asarray(turns % 1.0 - 0.5)
 
@@ -66,6 +74,8 @@ def find_matrix_defects(
                 f"{owner}: M is not symmetric, M w and Mᵀ w differ by {defect:.1g} of their size; "
                 "give a symmetric one"
             )
+
+    # No mass is negative, and one of zero stands alone in its row: M has no entry beside it.
     M = matrices["M"]
     masses = M.diagonal()
     if largest(comm, -np.min(masses, initial=0.0)) > 0.0:

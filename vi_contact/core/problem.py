@@ -92,6 +92,8 @@ class ContactProblem:
         These are -M r a_g(t), of every excitation.
         """
         system = self.unshaken
+
+        # One separable load for each excitation: a vector, times its history.
         terms = []
         for excitation in self.excitations:
             direction = np.asarray(excitation.direction, dtype=float)
@@ -132,6 +134,8 @@ class ContactProblem:
         dual = self.surface.dual
         if basis is None:
             return system
+
+        # The system keeps the last turned one, and the load that was turned with it.
         known: dict[Any, tuple[Load, SemiDiscreteSystem]] = system.make_once("turned", dict)
         if (basis, dual) not in known:
             known.clear()  # it takes as much memory as the system
@@ -225,6 +229,8 @@ def check_parts(problem: Any) -> None:
         provides(owner, "mass", problem.mass, ("apply",), remedy, lacks=("target",))
     for excitation in excitations:
         _check_excitation(excitation, system)
+
+    # Parts that are right by themselves and do not fit each other.
     if system.absolute and excitations:
         raise InputError(
             "a compliant base is shaken by its own upgoing motion: leave out the excitation of the "
@@ -240,6 +246,8 @@ def check_parts(problem: Any) -> None:
             f"ContactProblem: the surface is shared by {surface.comm.size} ranks and the system by "
             f"{system.algebra.comm.size}: make both on the same ranks"
         )
+
+    # What may be wrong on one rank alone: all ranks are asked before any of them raises.
     total = surface.total  # collective
     defects = (*_find_defects_of_system(system), *_find_defects_of_surface(surface, system, total))
     refuse(defects, surface.comm)
@@ -273,6 +281,7 @@ def _check_excitation(excitation: Any, system: SemiDiscreteSystem) -> None:
 
 def _find_defects_of_system(system: SemiDiscreteSystem) -> Iterator[str]:
     """Yield a sentence for each wrong size or value of a system on this rank."""
+    # All vectors have an entry for each unknown of this rank, n, and all matrices a row.
     n = system.rows
     d = system.influence.shape[1]
     for name in ("M", "K", "C"):
@@ -332,6 +341,8 @@ def _find_defects_of_surface(
     }
     shapes |= dict.fromkeys(("gap0", "weights", "bilateral", "compliance", "owned", "slots"), (m,))
     yield from _find_other_shapes("the contact surface", surface, shapes)
+
+    # Numbers of unknowns and of conditions must be there; a tangent of -1 is prescribed.
     for name, least, end in (("owned", 0, n), ("tangents", -1, n), ("slots", 0, total)):
         values = getattr(surface, name)
         if np.size(values) and not (least <= np.min(values) and np.max(values) < end):

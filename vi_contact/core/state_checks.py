@@ -46,7 +46,10 @@ def check_sizes(owner: str, problem: ContactProblem, state: Any) -> None:
 
 
 def _find_defects_of_state(problem: ContactProblem, state: State) -> Iterator[str]:
-    """Yield a sentence for each wrong array of a state on this rank."""
+    """Yield a sentence for each wrong array of a state on this rank.
+
+    Its memory is not looked at: that is for its scheme.
+    """
     n = problem.system.rows
     m = problem.surface.count
     d = problem.system.influence.shape[1]
@@ -85,6 +88,8 @@ def initial_state(problem: ContactProblem, t: float = 0.0) -> State:
     """
     system = problem.equations
     surface = problem.surface
+    # Only rigid supports bound u0: springs may be pressed. Round-off is relative to the largest
+    # displacement and gap of all ranks.
     gap = np.where(surface.rigid, surface.gap(t) - surface.normal_values(system.u0), np.inf)
     overlap = np.max(-gap, initial=-np.inf)
     gap0 = np.max(surface.gap0, initial=0.0)

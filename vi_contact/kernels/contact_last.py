@@ -218,7 +218,17 @@ def _multiply_rows(routine: Any, corner: Array, rows: Array, trans: int = 0) -> 
 
 
 def _order(library: Any, A: sp.csr_matrix, last: Indices) -> NDArray[np.int32]:
-    """Return the rows of A in the order of elimination: those of little fill, then ``last``."""
+    """Return the rows of A in the order of elimination: those of little fill, then ``last``.
+
+    Args:
+        library: the compiled functions.
+        A: the whole matrix (rows, rows).
+        last: (m,) the unknowns c, which keep their order.
+
+    Raises:
+        ArithmeticError: CHOLMOD finds no order.
+    """
+    # CHOLMOD orders the rows i alone, in numbers of their own.
     is_inner = np.ones(A.shape[0], dtype=bool)
     is_inner[last] = False
     inner = np.flatnonzero(is_inner)
@@ -234,7 +244,16 @@ def _order(library: Any, A: sp.csr_matrix, last: Indices) -> NDArray[np.int32]:
 
 
 def _factorise(library: Any, A: sp.csr_matrix, order: NDArray[np.int32]) -> Any:
-    """Return the factor, an object of the library."""
+    """Return the factor, an object of the library.
+
+    Args:
+        library: the compiled functions.
+        A: the whole matrix (rows, rows).
+        order: (rows,) the order of elimination.
+
+    Raises:
+        ArithmeticError: A has entries that are not finite, or is not positive definite.
+    """
     factor = ctypes.c_void_p()
     arrays = locate_arrays(A.indptr, A.indices, A.data, order)
     is_finite = np.isfinite(A.data).all()

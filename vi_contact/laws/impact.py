@@ -207,7 +207,7 @@ class Inelastic(ByUpdate):
 
 @dataclass(frozen=True)
 class Newton(ByUpdate):
-    """Apply Newton's law v_n⁺ = -e v_n⁻ on points that have just closed.
+    """Apply Newton's law of restitution v_n⁺ = -e v_n⁻ on points that have just closed.
 
     Points that stay closed are left to the step. v_n⁻ is the velocity of approach before the step:
     a single mass rebounds with e times its speed at every dt.

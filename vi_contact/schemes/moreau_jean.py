@@ -109,7 +109,13 @@ class MoreauJean(SingleStep):
         return (1.0 - self.theta) * load_at(t) + self.theta * load_at(t + dt)
 
     def _bound(self, problem: ContactProblem, state: State, dt: float) -> Array:
-        """Return the largest normal velocities (m,) [m/s] of closed points after the step."""
+        """Return the largest normal velocities (m,) [m/s] of closed points after the step.
+
+        Args:
+            problem: the problem that is marched.
+            state: the state at t0.
+            dt: size of the step [s].
+        """
         surface = problem.surface
         advance = surface.advance(state.t, state.t + dt)
         obstacle = 0.0 if advance is None else -advance / dt

@@ -37,8 +37,11 @@ def split_form(form: Any, u: Any, J: Any) -> tuple[Any, Any]:
     Raises:
         InputError: the form is neither, or not on the space of u.
     """
+    # A form of both rank 2 and 1 in one, a(u, v) - L(v), is the pair (a, L).
     if isinstance(form, ufl.Form) and len(form.arguments()) == 2:
         form = ufl.system(form)
+
+    # F(u; v), whose Jacobian is its derivative.
     if isinstance(form, ufl.Form):
         check_form("F", form, 1, u)
         if not depends_on(form, u):
@@ -51,6 +54,8 @@ def split_form(form: Any, u: Any, J: Any) -> tuple[Any, Any]:
         return form, jacobian
     if not isinstance(form, tuple | list) or len(form) != 2 or J is not None:
         raise make_error(f"the form is {quote(form)}, J {quote(J)}; {FORMS}, whose Jacobian is a")
+
+    # (a, L), which is linear: F = a(u, v) - L(v).
     a, L = form
     check_form("a", a, 2, u)
     check_form("L", L, 1, u)
