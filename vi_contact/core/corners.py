@@ -150,16 +150,18 @@ def lump_masses(surface: ContactSurface, nodal: Array) -> tuple[Indices, Indices
         surface: the contact conditions.
         nodal: masses (n,) [kg] of the unknowns.
     """
+    # The diagonal, from which the unknowns of oblique corners are taken out, and a small full block
+    # for each of these corners.
     diagonal = np.arange(len(nodal))
-    own = nodal.copy()
+    on_diagonal = nodal.copy()
     rows = [diagonal]
     columns = [diagonal]
-    values = [own]
+    values = [on_diagonal]
     for corner in find_oblique_corners(surface):
         unknowns = surface.owned[corner]
         cosines = surface.normals[corner] @ surface.normals[corner].T
         masses = np.sqrt(np.outer(nodal[unknowns], nodal[unknowns]))
-        own[unknowns] = 0.0
+        on_diagonal[unknowns] = 0.0
         rows.append(np.repeat(unknowns, len(unknowns)))
         columns.append(np.tile(unknowns, len(unknowns)))
         values.append((masses * np.linalg.inv(cosines)).ravel())

@@ -215,16 +215,19 @@ def _refuse_beside(owner: str, name: str, directions: Array, normals: Array) -> 
     cosines = np.sum(directions * normals, axis=1)
     if not len(cosines) or cosines.max() > BESIDE:
         return
+
+    # The sentence is about the part that the obstacle can reach, or about all of it where that is
+    # none.
     reached = cosines >= -RIGHT_ANGLE
     if not np.any(reached):
         reached = np.ones(len(cosines), dtype=bool)
     direction = _normalise(directions[reached].mean(axis=0))
     normal = _normalise(normals[reached].mean(axis=0))
     angle = np.degrees(np.arccos(np.clip(direction @ normal, -1.0, 1.0)))
-    what = "points into the body" if cosines.max() < -BESIDE else "is along the boundary"
+    defect = "points into the body" if cosines.max() < -BESIDE else "is along the boundary"
     raise InputError(
         f"{owner}: the contact direction {describe_point(direction.round(6))}{_of_boundary(name)} "
-        f"{what} at {angle:.4g} degrees to its mean outward normal "
+        f"{defect} at {angle:.4g} degrees to its mean outward normal "
         f"{describe_point(normal.round(6))}; choose the boundary that looks towards the obstacle, "
         f"or {REMEDY}"
     )

@@ -218,10 +218,10 @@ def compile_library(sources: Sequence[Path], options: Sequence[str], *libraries:
     except OSError:
         folder.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(dir=folder) as aside:
-            made = Path(aside) / file.name
-            command += [*map(str, sources), "-o", str(made), *map(str, libraries), "-lm"]
+            compiled = Path(aside) / file.name
+            command += [*map(str, sources), "-o", str(compiled), *map(str, libraries), "-lm"]
             subprocess.run(command, check=True, capture_output=True, text=True)
-            made.replace(file)
+            compiled.replace(file)
     return file
 
 

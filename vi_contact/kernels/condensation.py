@@ -36,21 +36,24 @@ def condense(
     # Contact unknowns of this rank, a row for each condition, and of all ranks by global numbers;
     # -1 stands for one that cannot move.
     first = A.algebra.first(A.matrix.rows)
-    own = surface.owned[:, None]
+    rows = surface.owned[:, None]
     if frictional:
-        own = np.hstack([own, surface.tangents])
-    unknowns = surface.everywhere(np.where(own >= 0, own + first, -1)).ravel()
-    moves = unknowns >= 0
-    last = unknowns[moves]
+        rows = np.hstack([rows, surface.tangents])
+    unknowns = surface.everywhere(np.where(rows >= 0, rows + first, -1)).ravel()
+    movable = unknowns >= 0
+    last = unknowns[movable]
 
     # An unknown of two conditions cannot be last twice.
     are_different = len(np.unique(last)) == len(last)
     factor = A.contact_last(last) if are_different else None
     if factor is not None:
-        return CondensedLast(factor, moves)
-    width = own.shape[1]
+        return CondensedLast(factor, movable)
+
+    # Otherwise solve for each of them. Those of condition j stand at j width, j width + 1, … among
+    # all.
+    width = rows.shape[1]
     places = surface.slots[:, None] * width + np.arange(width)
-    return CondensedTwice(A, surface, own[own >= 0], places[own >= 0], moves)
+    return CondensedTwice(A, surface, rows[rows >= 0], places[rows >= 0], movable)
 
 
 class CondensedLast:
