@@ -25,12 +25,12 @@ from ..core.arguments import check_arguments
 from ..core.checks import (
     array,
     check_count,
+    find_shape,
     flag,
     function,
     integers,
     mask,
     number,
-    shape_of,
     whole,
 )
 from ..core.errors import InputError
@@ -72,7 +72,7 @@ class BoundaryMesh:
                 f"and {len(points)} for all loops together"
             )
         flag("BoundaryMesh", "exterior", self.exterior)
-        tags = np.zeros(len(points)) if shape_of(self.labels) == (0,) else self.labels
+        tags = np.zeros(len(points)) if find_shape(self.labels) == (0,) else self.labels
         labels = integers("BoundaryMesh", "labels", tags, (len(points),))
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "loop_sizes", sizes)
@@ -221,7 +221,7 @@ def polygon(
     if len(start) < 3:
         raise InputError(f"polygon: corners has {len(start)} points; give three or more")
     sides = np.roll(start, -1, axis=0) - start
-    if shape_of(h) != ():
+    if find_shape(h) != ():
         counts = integers("polygon", "the number of elements of a side", h, (len(start),))
         whole("polygon", "the number of elements of a side", int(counts.min()), least=1)
     else:

@@ -33,7 +33,7 @@ from ..core.algebra import Array, Indices, Mask, max_abs
 from ..core.checks import array, describe_point, mask, optional, provides
 from ..core.errors import InputError
 from ..core.protocols import FrictionLaw, Frictionless
-from ..core.surfaces import nodal_frames
+from ..core.surfaces import make_nodal_frames
 from .contact import ASYMMETRIC, SUPPORTED, BoundaryContact, Conditions
 from .energetic import sum_products
 from .loads import traction_forces
@@ -211,10 +211,10 @@ class TwoBodies:
         touching = np.flatnonzero(np.isin(self.relative.nodes, compliance.nodes))
         if conditions is None:
             places = touching
-            frames = nodal_frames(compliance.normals)
+            frames = make_nodal_frames(compliance.normals)
         else:
             places = touching[conditions.nodes]
-            frames = nodal_frames(conditions.normals)
+            frames = make_nodal_frames(conditions.normals)
 
         def part(t: float, column: int) -> Array:
             """Return the part (c,) of the jump along the normals (0) or the tangents (1)."""

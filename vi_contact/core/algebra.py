@@ -430,7 +430,9 @@ def serial(matrix: Matrix) -> SerialMatrix:
     return matrix
 
 
-def upper_blocks(rows: sp.csr_matrix, width: int, first: int) -> tuple[Indices, Indices, Array]:
+def take_upper_blocks(
+    rows: sp.csr_matrix, width: int, first: int
+) -> tuple[Indices, Indices, Array]:
     """Return the upper triangle of a symmetric matrix as blocks, in compressed rows.
 
     Args:

@@ -25,7 +25,7 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from .checks import quote, real, shape_of, suggest_object
+from .checks import find_shape, quote, real, suggest_object
 from .errors import InputError
 from .quantities import Between, Quantity, read_quantities
 
@@ -299,7 +299,7 @@ def _is_whole(value: Any) -> bool:
 
 def _are_numbers(value: Any) -> bool:
     """Return whether a value is a number, or numbers in lists or arrays of equal lengths."""
-    if isinstance(value, str | bytes) or shape_of(value) == (-1,):
+    if isinstance(value, str | bytes) or find_shape(value) == (-1,):
         return False
     return np.asarray(value).dtype.kind in "iufb"
 

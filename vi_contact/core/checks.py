@@ -307,7 +307,7 @@ def optional(
         check(owner, meaning, value, *more, **options)
 
 
-def shape_of(value: Any) -> tuple[int, ...]:
+def find_shape(value: Any) -> tuple[int, ...]:
     """Return the shape of numbers in lists or arrays.
 
     Lists of different lengths have no shape; (-1,) stands for it.

@@ -162,7 +162,7 @@ def keep_error(name: str, error: Exception, instead: T) -> T:
     return instead
 
 
-def limit_of(law: Any, r_n: Any, weights: Any, scale: float) -> Any:
+def ask_limit(law: Any, r_n: Any, weights: Any, scale: float) -> Any:
     """Return the friction limit of a law (m,), by ``call_user`` as the law may be the user's own.
 
     Args:
@@ -178,8 +178,8 @@ def limit_of(law: Any, r_n: Any, weights: Any, scale: float) -> Any:
     )
 
 
-def slope_of(law: Any, weights: Any) -> Any:
-    """Return the slope of the friction limit of a law (m,), as ``limit_of`` does."""
+def ask_slope(law: Any, weights: Any) -> Any:
+    """Return the slope of the friction limit of a law (m,), as ``ask_limit`` does."""
     return call_user(
         f"the friction law {type(law).__name__}",
         lambda: law.slope(weights),

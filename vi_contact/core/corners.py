@@ -14,10 +14,10 @@ from .checks import describe_point
 from .errors import InputError
 from .surfaces import (
     ContactSurface,
+    arrange_frames,
     group_same_nodes,
-    nodal_blocks,
-    nodal_frames,
-    tangential_columns,
+    list_tangential_columns,
+    make_nodal_frames,
 )
 
 # CHOSEN: 30°, a usual feature angle; the coarsest circles of the models turn by less
@@ -77,12 +77,12 @@ def make_tangent_vectors(normals: Array, nodes: Indices | None) -> Array:
         normals: contact directions (m, d).
         nodes: numbers of their nodes (m,); None for one node each.
     """
-    column, blocks = nodal_blocks(nodal_frames(normals))
+    column, blocks = arrange_frames(make_nodal_frames(normals))
     corners = () if nodes is None else group_same_nodes(nodes)
     for rows in corners:
         if np.linalg.matrix_rank(normals[rows]) == len(rows):  # else two nodes at one place
             column[rows], blocks[rows] = make_corner_frame(normals[rows])
-    tangents = tangential_columns(column, normals.shape[1])
+    tangents = list_tangential_columns(column, normals.shape[1])
     return np.take_along_axis(blocks, tangents[:, None, :], axis=2)
 
 

@@ -258,7 +258,7 @@ def _normalise(vector: Array) -> Array:
     return np.asarray(vector / length + 0.0)
 
 
-def admissible_gap(gap: Array, points: Array, size: float) -> Array:
+def check_gap(gap: Array, points: Array, size: float) -> Array:
     """Return the initial gap (m,) [m] without round-off below zero.
 
     Args:

@@ -15,7 +15,7 @@ from .corners import refuse_rubbing
 from .errors import InputError
 from .protocols import EXCITATION, Excitation, FrictionLaw, Frictionless, ImpactLaw, MassLaw
 from .surfaces import ContactSurface
-from .system import Load, SemiDiscreteSystem, history_value
+from .system import Load, SemiDiscreteSystem, evaluate_history
 from .timing import report_time
 
 
@@ -48,7 +48,7 @@ class ContactProblem:
         if isinstance(self.surface, ContactSurface):
             agree(self.surface.comm, "ContactProblem", laws | {"excitation": self.excitation})
         check_parts(self)
-        object.__setattr__(self, "friction", with_values(self.friction, self.surface, self._own))
+        object.__setattr__(self, "friction", replace_tuples(self.friction, self.surface, self._own))
 
     def _own(self, values: tuple[Any, ...]) -> tuple[Any, ...]:
         """Return those of this rank, of values for the contact points of all ranks."""
@@ -178,13 +178,13 @@ class ContactProblem:
         # Lists of two or three numbers take less time than arrays.
         total = [0.0] * self.system.influence.shape[1]
         for excitation in self.excitations:
-            a = float(history_value(excitation.acceleration, t))
+            a = float(evaluate_history(excitation.acceleration, t))
             for i, component in enumerate(excitation.direction):
                 total[i] += a * component
         return np.array(total)
 
 
-def with_values(
+def replace_tuples(
     law: Any, surface: ContactSurface, change: Callable[[tuple[Any, ...]], tuple[Any, ...]]
 ) -> Any:
     """Return a law with other tuples on several ranks, and so the laws that it is made of.
@@ -199,7 +199,7 @@ def with_values(
     changes: dict[str, Any] = {}
     for name in [part.name for part in fields(law) if part.init]:
         old = getattr(law, name)
-        new = change(old) if isinstance(old, tuple) else with_values(old, surface, change)
+        new = change(old) if isinstance(old, tuple) else replace_tuples(old, surface, change)
         if new is not old:
             changes[name] = new
     return replace(law, **changes) if changes else law

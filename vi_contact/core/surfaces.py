@@ -8,8 +8,8 @@ every condition of this rank, and none of another's: what is asked of all of the
 u_n = u·n, gap = gap0 - u_n >= 0, reaction r_n >= 0.
 
 ``ContactSurface`` is a value: its methods read it, or return another surface (``moving``,
-``on_springs``, …). Below it stand the frames that T is made of: ``nodal_frames`` gives every
-contact node a normal and tangents, ``nodal_blocks`` says in which columns of T these stand.
+``on_springs``, …). Below it stand the frames that T is made of: ``make_nodal_frames`` gives every
+contact node a normal and tangents, ``arrange_frames`` says in which columns of T these stand.
 """
 
 import logging
@@ -426,7 +426,7 @@ def group_same_nodes(nodes: Indices) -> tuple[Indices, ...]:
     return tuple(order[start : start + k] for start, k in zip(starts, sizes, strict=True))
 
 
-def nodal_frames(directions: Array) -> Array:
+def make_nodal_frames(directions: Array) -> Array:
     """Return orthonormal frames (k, d, d) of contact directions (k, d).
 
     The first column is the contact direction n, the others are tangential. In the plane t = (-n_y,
@@ -447,14 +447,14 @@ def nodal_frames(directions: Array) -> Array:
     return frames
 
 
-def nodal_blocks(frames: Array) -> tuple[Indices, Array]:
+def arrange_frames(frames: Array) -> tuple[Indices, Array]:
     """Return (c, Q): nodal frames whose contact direction is in the column of its own component.
 
     Axes at right angles to a direction keep their own columns: they are the components that may be
     prescribed.
 
     Args:
-        frames: (k, d, d) as ``nodal_frames`` returns them.
+        frames: (k, d, d) as ``make_nodal_frames`` returns them.
 
     Returns:
         c (k,), the largest component of each direction, and Q (k, d, d), whose column c is the
@@ -480,7 +480,7 @@ def nodal_blocks(frames: Array) -> tuple[Indices, Array]:
     return normal, blocks
 
 
-def tangential_columns(column: Indices, d: int) -> Indices:
+def list_tangential_columns(column: Indices, d: int) -> Indices:
     """Return the columns (m, d-1) of a frame beside the normal ones (m,), ascending.
 
     Args:

@@ -150,7 +150,7 @@ class Load:
         """
         total = self.constant.copy()
         for vector, history in self.separable:
-            total += history_value(history, t) * vector
+            total += evaluate_history(history, t) * vector
         for part in self.general:
             total += part(t)
         return total
@@ -174,7 +174,7 @@ class Load:
         return replace(self, viscous=_turn(P, self.viscous))
 
 
-def history_value(history: Callable[[float], float], t: float) -> float:
+def evaluate_history(history: Callable[[float], float], t: float) -> float:
     """Return the value of a history at time t [s].
 
     NaN and infinity pass here: they are refused in the load as a whole. The usual float goes

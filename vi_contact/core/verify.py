@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .algebra import Comm
 from .certificate import Certificate
-from .collective import limit_of
+from .collective import ask_limit
 from .step import StepProblem, StepResult
 
 # How far rounding may show in A x, relative to the largest entry of A times that of x; and how
@@ -172,7 +172,7 @@ def _judge_friction(
 
     # The law at the slip rates of the answer, with the limit of its normal reactions.
     slip = surface.tangential_values(result.x) - step.slip0
-    limit = limit_of(step.friction_at(slip), result.r_n, surface.weights, step.scale)
+    limit = ask_limit(step.friction_at(slip), result.r_n, surface.weights, step.scale)
     r_t_size = np.linalg.norm(r_t, axis=1)
     slip_size = np.linalg.norm(slip, axis=1)
 

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from ..core.algebra import Array
-from ..core.checks import array, number, shape_of
+from ..core.checks import array, find_shape, number
 from ..core.errors import InputError
 from .layer import sized
 from .motion import ConstrainedSystem, check_positive
@@ -85,7 +85,7 @@ class RigidBody:
             owner,
             "inertia",
             self.inertia,
-            (3, 3) if len(shape_of(self.inertia)) == 2 else (3,),
+            (3, 3) if len(find_shape(self.inertia)) == 2 else (3,),
             unit="kg m²",
         )
         if not callable(self.point) or isinstance(self.point, type):

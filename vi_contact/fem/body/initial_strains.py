@@ -12,7 +12,7 @@ import numpy as np
 import ufl
 
 from ...core.algebra import Array, total
-from ...core.checks import array, function, optional, quote, shape_of
+from ...core.checks import array, find_shape, function, optional, quote
 from ...core.errors import InputError
 from ...core.quantities import RATIO
 from ...laws.materials import PlaneStress
@@ -107,7 +107,7 @@ def _tensors(
     Raises:
         InputError: none of these dimensions has the shape.
     """
-    shape = shape_of(value)
+    shape = find_shape(value)
     if shape != leading and shape not in {
         (*leading, n, n) for d in dimensions for n in (d, 3 if d == 2 else d)
     }:

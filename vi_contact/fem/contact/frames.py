@@ -22,10 +22,10 @@ from ...core.corners import PARALLEL, are_orthogonal, make_corner_frame
 from ...core.errors import InputError
 from ...core.surfaces import (
     ContactSurface,
+    arrange_frames,
     group_same_nodes,
-    nodal_blocks,
-    nodal_frames,
-    tangential_columns,
+    list_tangential_columns,
+    make_nodal_frames,
 )
 from ..mesh.nodal_space import NodalSpace
 from .borrowing import Borrowed
@@ -108,7 +108,7 @@ class NodalFrames:
         self.numbers, first, place = np.unique(numbers, return_index=True, return_inverse=True)
         self.place: Indices = place.ravel()
         self.double: Mask = np.bincount(self.place) > 1
-        column, self.blocks = nodal_blocks(nodal_frames(self.directions[first]))
+        column, self.blocks = arrange_frames(make_nodal_frames(self.directions[first]))
         self.column = column[self.place]
         self.turns = self.blocks.copy()
         self.rubs = np.ones((len(numbers), self.blocks.shape[1] - 1), dtype=bool)
@@ -138,7 +138,7 @@ class NodalFrames:
         m = self.place.size
         d = self.blocks.shape[1]
         own = np.zeros((m, d), dtype=bool)
-        np.put_along_axis(own, tangential_columns(self.column, d), self.rubs, axis=1)
+        np.put_along_axis(own, list_tangential_columns(self.column, d), self.rubs, axis=1)
         own[np.arange(m), self.column] = True
         return own
 
@@ -214,7 +214,7 @@ def surface_of(space: NodalSpace, parts: Sequence[NodalConditions], **data: Any)
     place = frames.place
     column = frames.column
     count = len(slots)
-    tangents = np.take_along_axis(index[place], tangential_columns(column, d), axis=1)
+    tangents = np.take_along_axis(index[place], list_tangential_columns(column, d), axis=1)
     turn = _turn(space, frames.turns, index)
     dual = _turn(space, frames.blocks, index) if largest(comm, frames.oblique) else None
     if space.hierarchy is not None:

@@ -16,8 +16,8 @@ from ...core.checks import array, describe_point, flag, optional, provides, seve
 from ...core.collective import agree
 from ...core.corners import FEATURE_ANGLE, PARALLEL, make_tangent_vectors
 from ...core.errors import InputError
-from ...core.obstacles import Obstacle, Touching, admissible_gap, locate_obstacle
-from ...core.surfaces import ContactSurface, tangential_columns
+from ...core.obstacles import Obstacle, Touching, check_gap, locate_obstacle
+from ...core.surfaces import ContactSurface, list_tangential_columns
 from ...core.system import SemiDiscreteSystem
 from ...core.timing import report_time
 from ..body.space import FemSpace, space_of
@@ -183,7 +183,7 @@ def moved_by_held(
     frames = NodalFrames(*given(conditions))
     free = ~joined_nodes([one.nodes for one in conditions]).held
     free = (
-        np.take_along_axis(free, tangential_columns(frames.column, space.dimension), axis=1)
+        np.take_along_axis(free, list_tangential_columns(frames.column, space.dimension), axis=1)
         & frames.rubs
     )
     tangents = make_tangent_vectors(frames.directions, frames.place)
@@ -239,7 +239,7 @@ def _obstacle(
         directions, gap = locate_obstacle(
             way, points, normals, name=name, angle=angle, alone=len(points) == count
         )
-        return snapped(directions), admissible_gap(gap, points, size)
+        return snapped(directions), check_gap(gap, points, size)
 
     return ask
 
@@ -288,7 +288,7 @@ def _looking(
         cosine = np.sum(ways * normals, axis=1)
         rows = np.flatnonzero(cosine > EDGE_ON * np.linalg.norm(ways, axis=1))
         directions[rows] = snapped(ways[rows])
-        gap[rows] = admissible_gap(gaps[rows], points[rows], size)
+        gap[rows] = check_gap(gaps[rows], points[rows], size)
         return directions, gap
 
     return ask

@@ -19,7 +19,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ...core.algebra import Array, Mask
-from ...core.collective import limit_of, slope_of
+from ...core.collective import ask_limit, ask_slope
 from ...core.errors import ViContactError
 from ...core.products import freeze
 from ...core.step import Answers, StepProblem, StepResult
@@ -107,8 +107,8 @@ class CondensedFriction:
         # All ranks get the problem of all conditions: bounds, and the law with the coefficients of
         # rest.
         rest = step.friction_at(np.zeros_like(step.slip0))
-        cohesion = limit_of(rest, np.zeros(surface.count), surface.weights, step.scale)
-        slope = slope_of(rest, surface.weights)
+        cohesion = ask_limit(rest, np.zeros(surface.count), surface.weights, step.scale)
+        slope = ask_slope(rest, surface.weights)
         columns = np.column_stack([step.bound, step.slip0, cohesion, slope, step.active])
         of_all = surface.everywhere(columns)
         values = of_all[:, :-3]

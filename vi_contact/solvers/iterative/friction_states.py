@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.algebra import Array, Indices, Mask
-from ...core.collective import limit_of, slope_of
+from ...core.collective import ask_limit, ask_slope
 from ...core.step import StepProblem
 from ...core.surfaces import ContactSurface
 from .contact import ClosedSet
@@ -295,4 +295,4 @@ class LawOfStep:
         none = np.zeros(step.surface.count)
         law = step.friction_at(slip)
         weights = step.surface.weights
-        return Limits(limit_of(law, none, weights, step.scale), slope_of(law, weights), none)
+        return Limits(ask_limit(law, none, weights, step.scale), ask_slope(law, weights), none)
