@@ -389,11 +389,11 @@ class SemiDiscreteSystem:
             v1: velocity (n,) [m/s] after it.
             dt: size of the step [s].
         """
-        velocity = (u1 - u0) / dt if self.C is None else self._difference("C", u0, u1, dt)
-        acceleration = self._difference("M", v0, v1, dt)
+        velocity = (u1 - u0) / dt if self.C is None else self._compute_rate("C", u0, u1, dt)
+        acceleration = self._compute_rate("M", v0, v1, dt)
         return velocity, acceleration
 
-    def _difference(self, name: str, x0: Array, x1: Array, dt: float) -> Array:
+    def _compute_rate(self, name: str, x0: Array, x1: Array, dt: float) -> Array:
         """Return (x1 - x0)/dt, whose product with a matrix is then known.
 
         Args:
