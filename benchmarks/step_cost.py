@@ -52,7 +52,7 @@ from vi_contact.core.algebra import EffectiveMatrix, SerialComm  # noqa: E402
 from vi_contact.core.state_checks import initial_state  # noqa: E402
 from vi_contact.fem.matrices.petsc_algebra import PREFIX, PetscFactor  # noqa: E402
 from vi_contact.kernels import contact_last  # noqa: E402
-from vi_contact.kernels.compiler import addresses, load_cholmod  # noqa: E402
+from vi_contact.kernels.compiler import load_cholmod, locate_arrays  # noqa: E402
 from vi_contact.meshes.block import BlockMesh  # noqa: E402
 from vi_contact.meshes.channel import ChannelMesh  # noqa: E402
 
@@ -154,7 +154,7 @@ class Cholmod:
     def solve(self, b: np.ndarray) -> np.ndarray:
         """Return A⁻¹ b."""
         x = b.copy()
-        self.factor._library.substitute(self.factor._factor, 0, 1, *addresses(x))  # CHOLMOD_A
+        self.factor._library.substitute(self.factor._factor, 0, 1, *locate_arrays(x))  # CHOLMOD_A
         return x
 
 

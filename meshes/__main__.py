@@ -19,7 +19,7 @@ from meshes.raft import RaftMesh
 from vi_contact import meshes as room
 from vi_contact.core.arguments import members_of
 from vi_contact.core.errors import InputError
-from vi_contact.core.quantities import Quantity, quantities
+from vi_contact.core.quantities import Quantity, read_quantities
 from vi_contact.meshes.gmsh_session import write
 
 NAMED = {name: getattr(room, name) for name in room.__all__ if name.endswith("Mesh")}
@@ -40,7 +40,7 @@ def parser() -> argparse.ArgumentParser:
         one = commands.add_parser(
             shape, help=first, description=mesh.__doc__, argument_default=argparse.SUPPRESS
         )
-        numbers = quantities(mesh)
+        numbers = read_quantities(mesh)
         for field in fields(mesh):
             if field.name in numbers:
                 add_option(one, field, numbers[field.name])

@@ -20,7 +20,7 @@ if __name__ == "__main__":  # run as a file of the source tree, maybe not instal
     sys.path[0] = str(Path(__file__).resolve().parents[1])
 
 from vi_contact.core.arguments import check_fields
-from vi_contact.core.checks import MOST_CELLS, counted
+from vi_contact.core.checks import MOST_CELLS, check_count
 from vi_contact.core.errors import InputError
 from vi_contact.core.quantities import Positive, Unit
 from vi_contact.meshes.gmsh_session import options
@@ -62,7 +62,7 @@ class BallMesh:
                 "radius"
             )
         cells = (self.foot / self.size) ** 3 + (self.radius / self._largest) ** 3
-        counted("ball", f"a cell size of {self.size} m", cells, "cells", most=MOST_CELLS)
+        check_count("ball", f"a cell size of {self.size} m", cells, "cells", most=MOST_CELLS)
 
     @property
     def _largest(self) -> float:

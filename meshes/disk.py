@@ -19,7 +19,7 @@ import numpy.typing as npt
 if __name__ == "__main__":  # run as a file of the source tree, maybe not installed
     sys.path[0] = str(Path(__file__).resolve().parents[1])
 
-from vi_contact.core.checks import MOST_CELLS, counted
+from vi_contact.core.checks import MOST_CELLS, check_count
 from vi_contact.core.errors import InputError
 
 _LINE, _TRIANGLE = 1, 2  # Gmsh's numbers
@@ -45,7 +45,7 @@ class DiskMesh:
                 "radius and"
                 " cells of at most half of it"
             )
-        counted(
+        check_count(
             "disk",
             f"a cell size of {self.size} m",
             (self.radius / self.size) ** 2,

@@ -21,7 +21,7 @@ if __name__ == "__main__":  # run as a file of the source tree, maybe not instal
     sys.path[0] = str(Path(__file__).resolve().parents[1])
 
 from vi_contact.core.arguments import check_fields
-from vi_contact.core.checks import MOST_CELLS, array, counted
+from vi_contact.core.checks import MOST_CELLS, array, check_count
 from vi_contact.core.errors import InputError
 from vi_contact.core.quantities import Positive, Unit
 
@@ -73,7 +73,7 @@ class RaftMesh:
                 f"m more than a raft {lx} x {ly} m on every side"
             )
         cells = 6.0 * lx * ly * (thick / self.size**3 + min(depth, lx) / self.soil_size**3)
-        counted(
+        check_count(
             "RaftMesh",
             f"cells of {self.size} and {self.soil_size} m",
             cells,

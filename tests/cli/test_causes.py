@@ -21,8 +21,8 @@ from marched_chain import chain, run
 from vi_contact import ground_motion
 from vi_contact.core.algebra import SerialComm
 from vi_contact.core.checks import on_all
-from vi_contact.core.errors import InputError, ViContactError, of_machine, of_memory
-from vi_contact.core.files import sentence
+from vi_contact.core.errors import InputError, ViContactError, is_of_machine, is_of_memory
+from vi_contact.core.files import describe_os_error
 from vi_contact.practice.cli.entry import main
 from vi_contact.run.files.checkpoint import read_checkpoint
 from vi_contact.run.files.reading import read_run
@@ -107,7 +107,7 @@ def test_a_checkpoint_that_does_not_fit_is_not_damaged(
     monkeypatch.setattr(f"vi_contact.run.files.checkpoint.{place}", raising(error))
     with pytest.raises((type(error), ViContactError)) as caught:
         read_checkpoint(tmp_path, chain(), scheme=ZienkiewiczWoodTaylor(), dt=5e-3)
-    assert "damaged" not in str(caught.value) and of_memory(caught.value)
+    assert "damaged" not in str(caught.value) and is_of_memory(caught.value)
 
 
 @pytest.mark.parametrize("number", [errno.EACCES, errno.EMFILE])
@@ -120,22 +120,23 @@ def test_permissions_and_limits_are_no_damage(
     with pytest.raises(OSError, match=os.strerror(number)) as caught:
         read_run(tmp_path)
     words = {errno.EACCES: "change its permissions", errno.EMFILE: "raise the limit of open files"}
-    assert f"history.h5' cannot be opened ({os.strerror(number)}): {words[number]}" in sentence(
-        caught.value
+    assert (
+        f"history.h5' cannot be opened ({os.strerror(number)}): {words[number]}"
+        in describe_os_error(caught.value)
     )
 
 
 def test_sentences_of_the_system_name_only_what_it_names() -> None:
-    assert sentence(OSError(errno.ENOSPC, "No space left on device")).startswith(
+    assert describe_os_error(OSError(errno.ENOSPC, "No space left on device")).startswith(
         "the disk is full: a file could not"
     )
-    assert "output folder cannot" not in sentence(OSError("something else"))
-    assert sentence(BrokenPipeError(errno.EPIPE, "Broken pipe", "/dev/stdout")).startswith(
+    assert "output folder cannot" not in describe_os_error(OSError("something else"))
+    assert describe_os_error(BrokenPipeError(errno.EPIPE, "Broken pipe", "/dev/stdout")).startswith(
         "what reads '/dev/stdout'"
     )
-    assert not of_machine(
+    assert not is_of_machine(
         OSError("Unable to open file (file signature not found)")
-    ) and not of_machine(ValueError("x"))
+    ) and not is_of_machine(ValueError("x"))
 
 
 def test_a_function_of_the_user_s_without_memory() -> None:
@@ -144,12 +145,12 @@ def test_a_function_of_the_user_s_without_memory() -> None:
         InputError, match="a load ended in MemoryError: .*: the machine refused it"
     ) as caught:
         on_all(SerialComm(), "a load", raising(MemoryError("no room")))
-    assert of_memory(caught.value)
+    assert is_of_memory(caught.value)
     with pytest.raises(
         InputError, match="a load ended in ZeroDivisionError: .*: correct its function"
     ) as other:
         on_all(SerialComm(), "a load", lambda: 1 / 0)
-    assert not of_memory(other.value)
+    assert not is_of_memory(other.value)
 
 
 # Streams

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import ArrayLike
 
 from vi_contact.core.algebra import Array
-from vi_contact.core.arguments import check_fields, checked
+from vi_contact.core.arguments import check_arguments, check_fields
 from vi_contact.core.errors import InputError
 from vi_contact.core.quantities import (
     RATIO,
@@ -21,7 +21,7 @@ from vi_contact.core.quantities import (
     NotNegative,
     Positive,
     Unit,
-    quantities,
+    read_quantities,
 )
 
 pytestmark = pytest.mark.serial
@@ -132,7 +132,7 @@ def test_subclasses_inherit_the_marks_and_add_theirs() -> None:
 
 
 def test_functions_say_the_same() -> None:
-    @checked
+    @check_arguments
     def bend(
         moment: Annotated[float, Finite, Unit("N·m")],
         *lengths: float,
@@ -168,7 +168,7 @@ def test_remedies_are_told_from_the_ends(limit: Between, whole: bool, said: str)
 
 
 def test_annotations_are_read_as_they_are_written() -> None:
-    said = quantities(Beam)
+    said = read_quantities(Beam)
     assert said["E"].unit == Unit("Pa") and said["E"].kind is float
     assert said["width"].kind == float | None and said["width"].limit is Positive
     assert Unit("kg/m³").typed == "kg/m3" and Unit("Pa·s").typed == "Pa*s"
@@ -177,12 +177,12 @@ def test_annotations_are_read_as_they_are_written() -> None:
     def nothing(x: Annotated[float, Between(1.0, 0.0)]) -> None: ...
 
     with pytest.raises(TypeError, match="give low < high"):
-        quantities(nothing)
+        read_quantities(nothing)
 
     def twice(x: Annotated[Length, Unit("s")]) -> None: ...
 
     with pytest.raises(TypeError, match="two things at once"):
-        quantities(twice)
+        read_quantities(twice)
 
 
 @dataclass(frozen=True)
@@ -193,7 +193,8 @@ class Short(Beam):
 
 
 def test_another_default_keeps_the_limits() -> None:
-    assert Short().length == 0.5 and quantities(Short)["length"] == quantities(Beam)["length"]
+    assert Short().length == 0.5
+    assert read_quantities(Short)["length"] == read_quantities(Beam)["length"]
     with pytest.raises(InputError, match="Short: length is -1; give a finite number above zero"):
         Short(length=-1)
 
@@ -207,7 +208,7 @@ def test_truth_values_are_no_numbers() -> None:
 def test_a_protocol_with_brackets_is_that_protocol() -> None:
     """As those in numpy's ArrayLike are."""
 
-    @checked
+    @check_arguments
     def centre(where: ArrayLike) -> ArrayLike:
         return where
 

@@ -85,6 +85,6 @@ def test_long_and_broken_values_are_shown_on_one_line():
         def __repr__(self) -> str:
             raise RuntimeError("no")
 
-    assert checks.shown(Broken()) == "an object of type Broken"
-    assert checks.shown(HUGE) == "an object of type int"
-    assert len(checks.shown(np.arange(1000.0))) == checks.SHOWN and "\n" not in checks.shown("a\nb")
+    assert checks.quote(Broken()) == "an object of type Broken"
+    assert checks.quote(HUGE) == "an object of type int"
+    assert len(checks.quote(np.arange(1000.0))) == checks.SHOWN and "\n" not in checks.quote("a\nb")

@@ -8,14 +8,14 @@ import scipy.sparse as sp
 from chain import chain_system
 
 from vi_contact.core.algebra import SerialComm, SerialMatrix
-from vi_contact.core.matrix_checks import asymmetry, matrix_defects
+from vi_contact.core.matrix_checks import find_matrix_defects, measure_asymmetry
 
 N = 40
 
 
 def found(**matrices):
     given = {name: SerialMatrix(A) for name, A in ({"M": sp.identity(N)} | matrices).items()}
-    return list(matrix_defects("mine", SerialComm(), np.arange(N), **given))
+    return list(find_matrix_defects("mine", SerialComm(), np.arange(N), **given))
 
 
 @pytest.fixture
@@ -29,7 +29,7 @@ def test_one_entry_is_found_whatever_its_units(K):
     units = sp.diags(np.where(np.arange(N) % 2, 1.0, 1e-6))
     K[7, 8] *= 1.0 + 1e-6
     for A in (K, units @ K @ units):
-        assert 1e-9 < asymmetry(SerialMatrix(A), SerialComm(), np.arange(N)) < 1e-5
+        assert 1e-9 < measure_asymmetry(SerialMatrix(A), SerialComm(), np.arange(N)) < 1e-5
         assert "M is not symmetric" in found(M=A)[0]
 
 

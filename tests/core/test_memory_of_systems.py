@@ -159,7 +159,7 @@ def test_factors_are_kept_by_what_they_are_of():
             made.append(objects)
             return len(made)
 
-        return system.cached("factor", make, *objects)
+        return system.make_once("factor", make, *objects)
 
     one, two = np.zeros(1), np.zeros(1)
     assert of(one) == 1 and of(two) == 2 and of(one) == 1 and of() == 3 and of(one, two) == 4

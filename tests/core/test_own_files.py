@@ -18,8 +18,8 @@ from vi_contact.core import own_files
 from vi_contact.core.errors import InputError
 from vi_contact.core.files import (
     copy_start,
-    frames_of,
     hdf5_atomically,
+    list_frames,
     open_hdf5,
     push,
     write_atomically,
@@ -118,12 +118,12 @@ def test_what_is_made_anew_takes_the_place_of_a_name(
         "hdf5": lambda: hdf5_atomically(path, lambda file: file.update({"x": 1})),
     }
     for name, write in writers.items():
-        for place in (path, own_files.temporary_of(path)):
+        for place in (path, own_files.name_temporary(path)):
             own_files.remove(place)
             FOREIGN[kind](place, notes)
         write()
         assert path.is_file() and not path.is_symlink(), name
-        own_files.remove(own_files.temporary_of(path))
+        own_files.remove(own_files.name_temporary(path))
     assert notes.read_bytes() == NOTES and not notes.with_name("nowhere").exists()
 
 
@@ -133,7 +133,7 @@ def test_hard_links_are_parted(tmp_path: Path, notes: Path) -> None:
         path = tmp_path / name
         os.link(notes, path)
         with write(path) as file:
-            assert own_files.names(file) == 1
+            assert own_files.count_names(file) == 1
             file.write(b", and more")
         assert path.read_bytes() == (NOTES if name == "continued" else b"") + b", and more"
     assert notes.read_bytes() == NOTES
@@ -148,7 +148,7 @@ def test_folders_inside_are_folders(tmp_path: Path) -> None:
             with pytest.raises(InputError, match="fields' is a link, .* put a folder in its place"):
                 call(tmp_path / "run", *names)
     with pytest.raises(InputError, match="fields' is a link"):
-        frames_of(tmp_path / "run")
+        list_frames(tmp_path / "run")
     assert own_files.make_inner_folder(tmp_path / "run", "a", "b").is_dir()
     (tmp_path / "run" / "file").write_text("")
     with pytest.raises(InputError, match="file' is a file, "):
@@ -167,7 +167,7 @@ def test_a_file_that_was_removed_is_another(tmp_path: Path) -> None:
     with own_files.open_lock(tmp_path / "lock") as file:
         assert own_files.same_file(tmp_path / "lock", file)
         (tmp_path / "lock").unlink()
-        assert not own_files.same_file(tmp_path / "lock", file) and own_files.names(file) == 0
+        assert not own_files.same_file(tmp_path / "lock", file) and own_files.count_names(file) == 0
         (tmp_path / "lock").write_text("")
         assert not own_files.same_file(tmp_path / "lock", file)
 

@@ -15,7 +15,7 @@ from chain import chain_problem
 from vi_contact.core.algebra import SerialAlgebra, SerialComm
 from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem
-from vi_contact.core.sizes import DENSE_ROWS, OWN_CONDITIONS, OWN_UNKNOWNS, small
+from vi_contact.core.sizes import DENSE_ROWS, OWN_CONDITIONS, OWN_UNKNOWNS, is_small_problem
 from vi_contact.laws.friction import Coulomb
 from vi_contact.run.march import march
 from vi_contact.solvers.condensed import Condensed
@@ -84,8 +84,8 @@ def test_small_is_counted_over_all_ranks() -> None:
         def sum(self, x: np.ndarray) -> np.ndarray:
             return 2.0 * x
 
-    assert small(SerialComm(), OWN_UNKNOWNS, OWN_CONDITIONS)
-    assert small(Two(), OWN_UNKNOWNS // 2, OWN_CONDITIONS // 2)
-    assert not small(Two(), OWN_UNKNOWNS // 2 + 1, 1) and not small(
+    assert is_small_problem(SerialComm(), OWN_UNKNOWNS, OWN_CONDITIONS)
+    assert is_small_problem(Two(), OWN_UNKNOWNS // 2, OWN_CONDITIONS // 2)
+    assert not is_small_problem(Two(), OWN_UNKNOWNS // 2 + 1, 1) and not is_small_problem(
         Two(), 1, OWN_CONDITIONS // 2 + 1
     )

@@ -12,10 +12,10 @@ from vi_contact.core.obstacles import (
     AnalyticGap,
     HalfSpace,
     Touching,
-    admissible_gap,
+    check_gap,
     locate_obstacle,
 )
-from vi_contact.core.surfaces import empty_surface, nodal_frames
+from vi_contact.core.surfaces import empty_surface, make_nodal_frames
 
 pytestmark = pytest.mark.serial
 POINTS = np.array([[0.0, 1.0], [2.0, 3.0], [-1.0, 0.5]])
@@ -88,11 +88,11 @@ def test_touching_and_analytic_gap_use_the_bodys_own_normal():
 
 def test_admissible_gap_removes_round_off_only():
     gap = np.array([-1e-13, 0.0, 0.3])
-    np.testing.assert_array_equal(admissible_gap(gap, POINTS, size=1.0), [0.0, 0.0, 0.3])
+    np.testing.assert_array_equal(check_gap(gap, POINTS, size=1.0), [0.0, 0.0, 0.3])
     with pytest.raises(InputError, match=r"penetrates its obstacle by 1e-13 m at \(0, 1\)"):
-        admissible_gap(gap, POINTS, size=1e-3)
+        check_gap(gap, POINTS, size=1e-3)
     with pytest.raises(InputError, match="NaN"):
-        admissible_gap(np.array([0.0, np.nan, 0.0]), POINTS, size=1.0)
+        check_gap(np.array([0.0, np.nan, 0.0]), POINTS, size=1.0)
 
 
 @pytest.mark.parametrize("d", [1, 2, 3])
@@ -100,7 +100,7 @@ def test_nodal_frames_are_orthonormal(d):
     n = np.random.default_rng(d).normal(size=(50, d))
     n = np.vstack([n, np.eye(d), -np.eye(d)])
     n /= np.linalg.norm(n, axis=1)[:, None]
-    frames = nodal_frames(n)
+    frames = make_nodal_frames(n)
     np.testing.assert_array_equal(frames[:, :, 0], n)
     np.testing.assert_allclose(
         frames.transpose(0, 2, 1) @ frames, np.tile(np.eye(d), (len(n), 1, 1)), atol=1e-14

@@ -95,6 +95,6 @@ def test_what_is_kept_is_made_once_and_belongs_to_one_system():
         made.append(object())
         return made[-1]
 
-    assert system.cached("factor", make) is system.cached("factor", make)
+    assert system.make_once("factor", make) is system.make_once("factor", make)
     assert len(made) == 1
-    assert system.with_load().cached("factor", make) is made[1]
+    assert system.with_load().make_once("factor", make) is made[1]

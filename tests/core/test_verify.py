@@ -13,7 +13,7 @@ from chain import chain_problem
 from shaken import changes, shaken
 
 from vi_contact.core.algebra import EffectiveMatrix, SerialMatrix
-from vi_contact.core.ledger import energies, energy_balance
+from vi_contact.core.ledger import compute_energies, energy_balance
 from vi_contact.core.state_checks import initial_state
 from vi_contact.core.step import Report, StepProblem, StepResult
 from vi_contact.core.verify import kkt_residual, kkt_residuals
@@ -191,9 +191,9 @@ def ledger(
     totals = dict.fromkeys(("input", "damping", "contact", "algorithmic", "impact"), 0.0)
     reports: list[Report] = []
     start = initial_state(problem)
-    first = biggest = energies(problem.equations, start.u, start.v).total
+    first = biggest = compute_energies(problem.equations, start.u, start.v).total
     for report in run(problem, scheme, dt=dt, steps=steps):
-        now = energies(problem.equations, report.new.u, report.new.v)
+        now = compute_energies(problem.equations, report.new.u, report.new.v)
         found = energy_balance(problem, report.old, before_impact(report), report.balance)
         for name in ("input", "damping", "contact", "algorithmic"):
             totals[name] += getattr(found, name)
@@ -242,7 +242,7 @@ def test_ledger_with_known_energies_is_the_same():
     problem = shaken(damping=1e-3)
     report = list(run(problem, HALF, dt=5e-3, steps=9))[-1]
     states = report.old, before_impact(report)
-    before, after = (energies(problem.equations, state.u, state.v) for state in states)
+    before, after = (compute_energies(problem.equations, state.u, state.v) for state in states)
     assert energy_balance(
         problem, *states, report.balance, before=before, after=after
     ) == energy_balance(problem, *states, report.balance)

@@ -296,13 +296,13 @@ def test_redistributed_mass_at_oblique_corners():
 def test_lumped_mass_does_not_depend_on_the_frames():
     """Lumped mass before the contact nodes give theirs away: the kinetic energy of any rigid
     motion."""
-    from vi_contact.core.corners import lumped_entries
+    from vi_contact.core.corners import lump_masses
 
     system, tags = body("trapezoid")
     surface = fem.contact_surface(system, group(tags, *SIDES[:4]))
     equations = ContactProblem(system, surface).equations
     row_sums = sum(r * (equations.M @ r) for r in equations.influence.T)
-    lumped = system.algebra.local(*lumped_entries(surface, row_sums), system.rows)
+    lumped = system.algebra.local(*lump_masses(surface, row_sums), system.rows)
     masses = []
     for matrix, frame in ((lumped, equations), (system.M, system)):
         rigid = frame.influence.T

@@ -43,7 +43,7 @@ def without(monkeypatch: Any, *missing: str) -> None:
     monkeypatch.setattr(
         packages, "petsc_has", lambda package: package not in gone and EVERY(package)
     )
-    compiler._without_cholmod.cache_clear()
+    compiler._report_no_cholmod.cache_clear()
 
 
 def falling_block(d: int, friction: bool) -> vc.ContactProblem:

@@ -145,7 +145,7 @@ def test_rows_of_matrices(simplices):
     first, rows = algebra.first(system.rows), np.arange(1, system.rows, 3)
     entries = algebra.entries(system.K, rows)
     assert np.array_equal(entries.toarray(), whole[first + rows])
-    replaced = all_rows(algebra.replaced_rows(system.rows, rows, entries))
+    replaced = all_rows(algebra.replace_identity_rows(system.rows, rows, entries))
     wanted = np.eye(len(whole))
     every = np.concatenate(COMM.allgather(first + rows))
     wanted[every] = whole[every]

@@ -17,7 +17,7 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.state_checks import initial_state
 from vi_contact.fem import compat
 from vi_contact.practice.soil.moving_base import base_motion
-from vi_contact.run.recorders.contact_parts import tangent_vectors
+from vi_contact.run.recorders.contact_parts import make_tangent_vectors
 
 WIDTH, HEIGHT = 0.5, 4.0
 TIP, WIND, WEIGHT = (2000.0, -5000.0), 700.0, (300.0, -24000.0)  # Pa, Pa, N/m³
@@ -351,7 +351,7 @@ def test_tangents_are_those_of_the_surfaces() -> None:
         directions = np.vstack(
             [np.eye(d), -np.eye(d), inclined / np.linalg.norm(inclined, axis=1)[:, None]]
         )
-        tangents = tangent_vectors(directions, np.arange(len(directions)))
+        tangents = make_tangent_vectors(directions, np.arange(len(directions)))
         for direction, found in zip(directions, tangents, strict=True):
             frame = np.column_stack([direction, found])
             assert np.allclose(frame.T @ frame, np.eye(d), atol=1e-14)

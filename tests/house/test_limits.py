@@ -14,9 +14,9 @@ pytest.importorskip("dolfinx")
 
 from public_callables import callables, right
 
-from vi_contact.core.arguments import _check, fits
+from vi_contact.core.arguments import _check_quantity, fits
 from vi_contact.core.errors import InputError
-from vi_contact.core.quantities import Between, Quantity, quantities
+from vi_contact.core.quantities import Between, Quantity, read_quantities
 from vi_contact.practice.engineering import checks
 from vi_contact.practice.studies.cases.vocabulary import _FUNCTIONS
 
@@ -44,7 +44,7 @@ def marked() -> Iterator[tuple[str, Callable[..., Any], str, Quantity]]:
     of_checks = [(f"checks.{one}", getattr(checks, one)) for one in checks.__all__]
     for name, found in [*callables(), *of_checks, *cases]:
         plain = inspect.isclass(found) and not hasattr(found, "__dataclass_fields__")
-        said = quantities(found.__init__ if plain else found)  # type: ignore[misc]
+        said = read_quantities(found.__init__ if plain else found)  # type: ignore[misc]
         for argument in inspect.signature(found).parameters if said else ():
             if argument in said and said[argument].limit is not None:
                 yield name, found, argument, said[argument]
@@ -83,12 +83,12 @@ def test_every_limit_of_an_annotation_is_told() -> None:
         for wrong in [one if alone else (1.0, one) for one in beyond(limit)]:
             try:
                 if name in BEHIND:
-                    _check(name, argument, wrong, asked)
+                    _check_quantity(name, argument, wrong, asked)
                 else:
                     call(found, argument, wrong, values)
                 defects.append(f"{name}({argument}={wrong}) is taken")
             except InputError as error:
-                if asked.named(argument) not in str(error) or limit.in_words(whole) not in str(
+                if asked.describe(argument) not in str(error) or limit.in_words(whole) not in str(
                     error
                 ):
                     defects.append(f"{name}({argument}={wrong}): {error}")
@@ -100,7 +100,7 @@ def test_every_limit_of_an_annotation_is_told() -> None:
 
 def call(found: Callable[..., Any], argument: str, wrong: Any, values: dict[str, Any]) -> None:
     """Call with one wrong argument and those that are needed."""
-    said = quantities(found)
+    said = read_quantities(found)
     parameters = inspect.signature(found).parameters.values()
     given = {
         one.name: within(said.get(one.name, Quantity(Any)), one.name, values)

@@ -25,7 +25,7 @@ from pictures import is_drawn
 import vi_contact as vc
 from vi_contact import solvers
 from vi_contact.core import kkt_residual
-from vi_contact.core.ledger import energies
+from vi_contact.core.ledger import compute_energies
 
 pytest.importorskip("matplotlib")
 pytestmark = pytest.mark.serial
@@ -177,7 +177,9 @@ def test_bouncing_bar_on_coarse_meshes(figures: ModuleType) -> None:
             problem, force = figures.bar(case, n, mass=mass), 0.0
             for _, report in vc.march(problem, scheme=scheme, dt=courant / n, t_end=case.period):
                 force = max(force, float(report.new.r_n[0]) / 0.5)
-            energy = energies(problem.equations, report.new.u, report.new.v).total / case.energy
+            energy = (
+                compute_energies(problem.equations, report.new.u, report.new.v).total / case.energy
+            )
             bounds = re.fullmatch(r"more than (\d+), more than (\d+)", cell)
             if bounds:
                 assert energy > float(bounds[1]) and force > float(bounds[2])

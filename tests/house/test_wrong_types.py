@@ -17,7 +17,7 @@ from public_callables import callables, right
 
 import vi_contact as vc
 from vi_contact import ground_motion, laws, meshes, run, studies
-from vi_contact.core.arguments import check, check_fields, checked, fits, words
+from vi_contact.core.arguments import check_arguments, check_fields, check_type, describe_type, fits
 from vi_contact.core.errors import InputError
 
 pytestmark = pytest.mark.serial
@@ -197,15 +197,16 @@ def test_types_as_annotations_have_them() -> None:
         assert fits(value, kind) == fit, (value, kind)
         if not fit:
             with pytest.raises(InputError, match="it: x is .*; give "):
-                check("it", "x", value, kind)
-    assert words(float | None) == "a real number or None" and words(str | Path) == "a path"
+                check_type("it", "x", value, kind)
+    assert describe_type(float | None) == "a real number or None"
+    assert describe_type(str | Path) == "a path"
 
 
 def test_what_is_checked_keeps_its_face() -> None:
     """Name, text and signature, which pages of names and case files read; arguments that are wrong
     by name stay."""
 
-    @checked
+    @check_arguments
     def one(x: float, *, name: str = "a") -> float:
         """Return x."""
         return x

@@ -84,13 +84,13 @@ def test_parts_beside_dense_algebra(name: str, short: float, monkeypatch: Any) -
         assert np.abs(found - expected).max(initial=0.0) <= limit * np.abs(inverse).max() * len(b)
 
     near(factor.solve(b), inverse @ b)
-    near(factor.free(factor.forward(b)), (inverse @ b)[c])
+    near(factor.solve_corner(factor.forward(b)), (inverse @ b)[c])
     wanted = np.linspace(-1.0, 1.0, len(c))
     x = factor.backward(wanted)
     assert np.array_equal(x[c], wanted)
     near(x[i], np.linalg.solve(dense[np.ix_(i, i)], b[i] - dense[np.ix_(i, c)] @ wanted))
-    factor.unloaded()
-    near(factor.backward(factor.free(factor.reduced(wanted))), inverse[:, c] @ wanted)
+    factor.forget_load()
+    near(factor.backward(factor.solve_corner(factor.reduce(wanted))), inverse[:, c] @ wanted)
 
 
 def test_matrices_that_are_not_positive_definite_are_left_to_others() -> None:
@@ -112,8 +112,9 @@ def cold(tmp_path: Path, monkeypatch: Any) -> Any:
 
 def forget() -> None:
     """Ask for compiled functions anew."""
-    for one in (compiler._loops, compiler._with_cholmod, compiler._without_cholmod):
-        one.cache_clear()
+    compiler._load_own_loops.cache_clear()
+    compiler._compile_with_cholmod.cache_clear()
+    compiler._report_no_cholmod.cache_clear()
 
 
 @pytest.fixture
@@ -148,7 +149,7 @@ def test_without_it_today_s_factor_serves_and_the_log_says_so_once(
         said = "there is no C compiler that works"
     elif how == "no header":
         monkeypatch.setattr(
-            compiler, "cholmod_of_petsc", lambda: Path("/nowhere/lib/libcholmod.so.3")
+            compiler, "locate_cholmod_of_petsc", lambda: Path("/nowhere/lib/libcholmod.so.3")
         )
         said = "there is no header cholmod.h beside /nowhere/lib/libcholmod.so.3"
     elif how == "no CHOLMOD":
@@ -202,12 +203,12 @@ def test_a_cholmod_of_another_version_than_its_header_is_left_alone(
     """Structures change between versions: the compiled file itself compares."""
     if not packages.petsc_has("cholmod"):
         pytest.skip("PETSc has no CHOLMOD here")
-    header = compiler._header(compiler.cholmod_of_petsc()) / "cholmod.h"
+    header = compiler._locate_header_folder(compiler.locate_cholmod_of_petsc()) / "cholmod.h"
     other = tmp_path / "cholmod.h"
     other.write_text(
         f'#include "{header}"\n#undef CHOLMOD_SUB_VERSION\n#define CHOLMOD_SUB_VERSION 99\n'
     )
-    monkeypatch.setattr(compiler, "_header", lambda file: tmp_path)
+    monkeypatch.setattr(compiler, "_locate_header_folder", lambda file: tmp_path)
     monkeypatch.setattr(compiler, "LOOPS", [small])
     forget()
     assert load_cholmod(SerialComm()) is None

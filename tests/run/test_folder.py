@@ -19,9 +19,9 @@ from chain import chain_problem
 from vi_contact.core.algebra import SerialComm
 from vi_contact.core.errors import InputError, ViContactError
 from vi_contact.core.files import (
+    describe_os_error,
     hdf5_atomically,
     on_root,
-    sentence,
     to_json,
     write_all,
     write_atomically,
@@ -167,7 +167,7 @@ def test_sentences() -> None:
         (errno.EIO, "read or written"),
     )
     for number, words in known:
-        text = sentence(OSError(number, "reason", "a/history.csv"))
+        text = describe_os_error(OSError(number, "reason", "a/history.csv"))
         assert (
             words in text
             and "'a/history.csv'" in text

@@ -20,7 +20,7 @@ from shaken import changes, shaken
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
-from vi_contact.core.ledger import energies, energy_balance
+from vi_contact.core.ledger import compute_energies, energy_balance
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.state_checks import initial_state
 from vi_contact.core.step import Report, State
@@ -134,7 +134,7 @@ def ledger(problem: ContactProblem, reports: Iterable[Report]) -> tuple[float, R
     for last in reports:
         step = energy_balance(problem, last.old, before_impact(last), last.balance)
         defect = max(defect, abs(step.defect))
-        largest = max(largest, energies(problem.equations, last.new.u, last.new.v).total)
+        largest = max(largest, compute_energies(problem.equations, last.new.u, last.new.v).total)
     assert last is not None
     return defect / largest, last
 

@@ -25,7 +25,12 @@ from vi_contact.core.algebra import Array
 from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.step import State
-from vi_contact.core.surfaces import ContactSurface, nodal_blocks, nodal_frames, tangential_columns
+from vi_contact.core.surfaces import (
+    ContactSurface,
+    arrange_frames,
+    list_tangential_columns,
+    make_nodal_frames,
+)
 from vi_contact.exact.hertz import HertzPoint, contact_modulus, contact_radius
 from vi_contact.fem.body.assembly import assemble
 from vi_contact.fem.body.loads import Prescribed
@@ -271,8 +276,8 @@ class Caps:
     def found(self, state: State) -> Contact:
         """What the contact answers, of all ranks."""
         surface = self.problem.surface
-        normal, blocks = nodal_blocks(nodal_frames(surface.normals))
-        columns = tangential_columns(normal, 3)
+        normal, blocks = arrange_frames(make_nodal_frames(surface.normals))
+        columns = list_tangential_columns(normal, 3)
         friction = np.zeros_like(surface.points)
         if state.r_t is not None:
             for i in (0, 1):

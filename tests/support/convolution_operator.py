@@ -21,7 +21,7 @@ from vi_contact.bem.boundary_operators import check_body
 from vi_contact.bem.energetic import NUMBERS, check_time_step
 from vi_contact.bem.quadrature import Orders
 from vi_contact.core.algebra import Array, Indices, Mask
-from vi_contact.core.checks import counted, flag
+from vi_contact.core.checks import check_count, flag
 from vi_contact.laws.materials import LinearElastic
 
 # |s| h/c_S reaches 100 with small steps; points cost nothing per frequency
@@ -121,7 +121,7 @@ def convolution_operator(
     check_body(mesh, material, orders)
     flag("convolution_operator", "symmetric", symmetric)
     table = Frequencies(dt, steps)
-    counted(
+    check_count(
         "convolution_operator",
         f"{table.s.size} frequencies of {len(mesh)} elements",
         24 * table.s.size * len(mesh) ** 2,

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vi_contact.core.algebra import Array
-from vi_contact.core.checks import function, number, shape_of, whole
+from vi_contact.core.checks import find_shape, function, number, whole
 from vi_contact.core.errors import InputError
 
 RADAU = np.array([[5.0, -1.0], [9.0, 3.0]]) / 12.0
@@ -118,9 +118,9 @@ class Frequencies:
             "give a function (dt, steps) that returns means over steps",
         )
         fine = forces(self.dt / 3, self.steps * 3)
-        if not shape_of(fine) or len(fine) != self.steps * 3:
+        if not find_shape(fine) or len(fine) != self.steps * 3:
             raise InputError(
-                f"substep_means: forces(dt, {self.steps * 3}) has shape {shape_of(fine)}; return "
+                f"substep_means: forces(dt, {self.steps * 3}) has shape {find_shape(fine)}; return "
                 "one mean for each step"
             )
         first, second, third = np.moveaxis(fine.reshape(self.steps, 3, *fine.shape[1:]), 1, 0)

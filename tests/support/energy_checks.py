@@ -9,7 +9,7 @@ import numpy as np
 from bar import before_impact, energy, run
 
 from vi_contact.core.algebra import total
-from vi_contact.core.ledger import energies, energy_balance
+from vi_contact.core.ledger import compute_energies, energy_balance
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.state_checks import initial_state
 from vi_contact.core.step import Report, State
@@ -59,7 +59,9 @@ def course(
         step = energy_balance(problem, report.old, before_impact(report), report.balance)
         now = energy(problem, report.new)
         rise, last, defect = max(rise, now - last), now, defect + step.defect
-        largest = max(largest, energies(problem.equations, report.new.u, report.new.v).total)
+        largest = max(
+            largest, compute_energies(problem.equations, report.new.u, report.new.v).total
+        )
         min_gap = min(min_gap, float((surface.gap0 - surface.normal_values(report.new.u)).min()))
         contact, algorithmic = min(contact, step.contact), min(algorithmic, step.algorithmic)
         friction = min(friction, step.friction)

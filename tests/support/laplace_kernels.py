@@ -19,7 +19,7 @@ from scipy.special import kv
 
 from vi_contact.bem.fundamental_solution import TWO_PI, KernelSet, check_speeds
 from vi_contact.core.algebra import Array
-from vi_contact.core.checks import shown
+from vi_contact.core.checks import quote
 from vi_contact.core.errors import InputError
 
 EULER = float(np.euler_gamma)
@@ -44,7 +44,7 @@ class LaplaceKernels:
             or (not complex(self.s).real > 0.0)
         ):
             raise InputError(
-                f"LaplaceKernels: the frequency s is {shown(self.s)}; give a complex number with a "
+                f"LaplaceKernels: the frequency s is {quote(self.s)}; give a complex number with a "
                 "positive real part [1/s]"
             )
 

@@ -24,7 +24,7 @@ from vi_contact.bem.boundary_operators import Galerkin
 from vi_contact.bem.fundamental_solution import TWO_PI, KernelSet
 from vi_contact.bem.quadrature import Orders, point_sets
 from vi_contact.core.algebra import Array
-from vi_contact.core.checks import counted, number
+from vi_contact.core.checks import check_count, number
 
 POINTS = 16  # Chebyshev points of a panel
 PANELS = 100_000  # of equal width
@@ -45,7 +45,7 @@ class RadialTable(Galerkin):
         super().__init__(mesh, c_s, orders)
         number("RadialTable", "the width of its panels", width, positive=True, unit="m")
         far = float(self.pairs.r_max.max())
-        counted("RadialTable", "the width of its panels", far / width, "panels", most=PANELS)
+        check_count("RadialTable", "the width of its panels", far / width, "panels", most=PANELS)
         dyadic = width * 0.5 ** np.arange(
             np.ceil(np.log2(width / (INNERMOST * mesh.lengths.min()))), 0.0, -1.0
         )

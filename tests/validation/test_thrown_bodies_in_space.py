@@ -13,7 +13,7 @@ from two_bodies import momenta
 
 import vi_contact as vc
 from vi_contact.core.algebra import Array, largest, max_abs
-from vi_contact.core.ledger import energies, energy_balance
+from vi_contact.core.ledger import compute_energies, energy_balance
 
 COMM = MPI.COMM_WORLD
 BENT = 0.2  # [1/m]: curvature of the curved faces
@@ -63,7 +63,7 @@ def test_a_whole_collision(scheme, bent, gap, friction, simplices):
         moments.append(dt * surface.comm.sum(np.einsum("kmc,mc->k", arms, r_t)))
         motions.append(motion(state.v))
         defects.append(energy_balance(problem, report.old, state, balance).defect)
-        energy = max(energy, energies(equations, state.u, state.v).total)
+        energy = max(energy, compute_energies(equations, state.u, state.v).total)
         sets.append(status(report))
     counts, scale, drift = (
         np.array(sets),

@@ -16,7 +16,7 @@ from own_forms import clamped, space, square
 
 from vi_contact import InputError, vi
 from vi_contact.core.algebra import SerialComm
-from vi_contact.vi.rounding import OFF, size_of_field
+from vi_contact.vi.rounding import OFF, measure_field
 
 INF = np.inf
 SIZES = {
@@ -39,7 +39,7 @@ SIZES = {
 @pytest.mark.parametrize("name", SIZES)
 def test_the_size_of_a_field(name: str) -> None:
     values, lower, upper, size = SIZES[name]
-    assert size_of_field(np.array(values), np.array(lower), np.array(upper), SerialComm()) == size
+    assert measure_field(np.array(values), np.array(lower), np.array(upper), SerialComm()) == size
 
 
 def membrane(comm: Any, degree: int) -> tuple[Any, Any, Any]:

@@ -32,7 +32,7 @@ import numpy as np
 
 from ..core import checks
 from ..core.algebra import Array, SerialFactor, SerialMatrix
-from ..core.checks import counted, function, instance, number, optional, provides, whole
+from ..core.checks import check_count, function, instance, number, optional, provides, whole
 from ..core.errors import StepFailure
 from ..core.files import write_csv
 from .elements import Elements, beam_matrices
@@ -199,7 +199,7 @@ def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) 
     size = (len(COLUMNS) + 1) * steps
     if every:
         size += 4 * stepper.elements.count * (steps // every)
-    counted("run_beam", f"a run of {steps} steps", size, "numbers to keep")
+    check_count("run_beam", f"a run of {steps} steps", size, "numbers to keep")
 
     # March, and keep a row of each state and snapshots of some.
     x = stepper.elements.nodes(stepper.beam.length)

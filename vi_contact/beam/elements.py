@@ -26,8 +26,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..core.algebra import Array
-from ..core.arguments import check_fields, checked
-from ..core.checks import counted, number
+from ..core.arguments import check_arguments, check_fields
+from ..core.checks import check_count, number
 from ..core.errors import InputError
 from ..core.quantities import Between
 from .values import Rod, TimoshenkoBeam
@@ -62,7 +62,7 @@ class Elements:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        counted("Elements", "count", self.count, "elements", most=MOST)
+        check_count("Elements", "count", self.count, "elements", most=MOST)
         if self.published_end and self.reduced_shear:
             raise InputError(
                 "Elements: the published end function goes with reduced_shear=False, as in the "
@@ -79,7 +79,7 @@ class Elements:
         return np.linspace(0.0, length, self.count + 1)[1:]
 
 
-@checked
+@check_arguments
 def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> tuple[Any, Any, Array]:
     """Assemble the matrices of the beam: ½ wᵀMw and ½ yᵀSy are its energies [J], and C = a2 S.
 
@@ -147,7 +147,7 @@ def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> tuple[Any, Any, A
     return M, stiffness, load
 
 
-@checked
+@check_arguments
 def rod_matrices(rod: Rod, count: Annotated[int, Between(2, math.inf)]) -> tuple[Any, Any, Array]:
     """Assemble the matrices of the rod: ½ wᵀMw and ½ vᵀKv are its energies [J], and C = a1 K.
 

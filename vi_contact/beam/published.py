@@ -14,7 +14,7 @@ initial data are lost: "moves downward".
 
 from collections.abc import Callable
 
-from ..core.arguments import checked
+from ..core.arguments import check_arguments
 from ..core.checks import number
 from .elements import Elements
 from .tip import RegularisedFriction
@@ -26,7 +26,7 @@ DT = 0.002
 STEPS = 1000
 
 
-@checked
+@check_arguments
 def published_mu(t: float, rate: float) -> float:
     """Return the coefficient mu = |slip rate|/100 [-] of Ahn (2012), section 8.
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core.algebra import Array
 from ..core.arguments import check_fields
-from ..core.checks import array, function, optional, shape_of
+from ..core.checks import array, find_shape, function, optional
 from ..core.quantities import NotNegative, Positive, Unit
 
 Profile = Callable[[Array], Array]
@@ -140,6 +140,6 @@ class Start:
             InputError: it does not give finite numbers, one for each node or one for all.
         """
         values = getattr(self, name)(x)
-        shape = () if shape_of(values) == () else x.shape
+        shape = () if find_shape(values) == () else x.shape
         numbers = array("Start", f"what {name}(x) returns", values, shape)
         return np.broadcast_to(numbers, x.shape).copy()

@@ -21,8 +21,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.algebra import Array
-from ..core.arguments import checked
-from ..core.checks import array, counted, flag, function, integers, mask, number, shape_of, whole
+from ..core.arguments import check_arguments
+from ..core.checks import (
+    array,
+    check_count,
+    find_shape,
+    flag,
+    function,
+    integers,
+    mask,
+    number,
+    whole,
+)
 from ..core.errors import InputError
 from ..core.quantities import Between, Positive, Unit
 from .loops import check_orientation, check_simple, check_size
@@ -53,7 +63,7 @@ class BoundaryMesh:
 
     def __post_init__(self) -> None:
         points = array("BoundaryMesh", "points", self.points, (None, 2), unit="m")
-        counted("BoundaryMesh", "points", len(points), "elements", most=MOST_ELEMENTS)
+        check_count("BoundaryMesh", "points", len(points), "elements", most=MOST_ELEMENTS)
         given_sizes = integers("BoundaryMesh", "loop_sizes", self.loop_sizes, (None,))
         sizes = tuple(given_sizes.tolist()) or (len(points),)
         if min(sizes) < 3 or sum(sizes) != len(points):
@@ -62,7 +72,7 @@ class BoundaryMesh:
                 f"and {len(points)} for all loops together"
             )
         flag("BoundaryMesh", "exterior", self.exterior)
-        tags = np.zeros(len(points)) if shape_of(self.labels) == (0,) else self.labels
+        tags = np.zeros(len(points)) if find_shape(self.labels) == (0,) else self.labels
         labels = integers("BoundaryMesh", "labels", tags, (len(points),))
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "loop_sizes", sizes)
@@ -211,7 +221,7 @@ def polygon(
     if len(start) < 3:
         raise InputError(f"polygon: corners has {len(start)} points; give three or more")
     sides = np.roll(start, -1, axis=0) - start
-    if shape_of(h) != ():
+    if find_shape(h) != ():
         counts = integers("polygon", "the number of elements of a side", h, (len(start),))
         whole("polygon", "the number of elements of a side", int(counts.min()), least=1)
     else:
@@ -219,16 +229,16 @@ def polygon(
         with np.errstate(over="ignore"):
             numbers = np.maximum(1.0, np.ceil(np.hypot(*sides.T) / length - 1e-9))
         total = float(numbers.sum())
-        counted("polygon", f"h = {length:g} m", total, "elements", most=MOST_ELEMENTS)
+        check_count("polygon", f"h = {length:g} m", total, "elements", most=MOST_ELEMENTS)
         counts = numbers.astype(int)
-    counted("polygon", "h", int(counts.sum()), "elements", most=MOST_ELEMENTS)
+    check_count("polygon", "h", int(counts.sum()), "elements", most=MOST_ELEMENTS)
     fractions = [np.arange(count)[:, None] / count for count in counts]
     points = [p + f * side for p, f, side in zip(start, fractions, sides, strict=True)]
     labels = np.repeat(np.arange(len(start)), counts)
     return BoundaryMesh(np.concatenate(points), labels=labels, exterior=exterior)
 
 
-@checked
+@check_arguments
 def circle(
     radius: Annotated[float, Positive, Unit("m")],
     count: Annotated[int, Between(3, math.inf)],
@@ -245,7 +255,7 @@ def circle(
         exterior: whether the body is the space around a round hole instead.
     """
     middle = array("circle", "centre", centre, (2,), unit="m")
-    counted("circle", "count", count, "elements", most=MOST_ELEMENTS)
+    check_count("circle", "count", count, "elements", most=MOST_ELEMENTS)
     once_around = -2.0 * np.pi if exterior else 2.0 * np.pi
     angle = once_around * (np.arange(count) / count) - 0.5 * np.pi
     directions = np.stack([np.cos(angle), np.sin(angle)], axis=1)

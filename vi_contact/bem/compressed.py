@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.algebra import Array, Indices, Mask
-from ..core.checks import counted
+from ..core.checks import check_count
 from .boundary_mesh import BoundaryMesh
 from .element_pairs import ElementPairs
 from .tails import tail
@@ -199,7 +199,7 @@ def compress_blocks(
     Raises:
         InputError: too many steps, or too many numbers for the memory.
     """
-    counted("boundary elements", f"a circle of {steps} steps", steps, "steps", most=LONGEST)
+    check_count("boundary elements", f"a circle of {steps} steps", steps, "steps", most=LONGEST)
     reach = AHEAD * steps
     n = len(mesh)
     above, spans = _find_windows(mesh, pairs, speeds, dt, reach)
@@ -212,7 +212,9 @@ def compress_blocks(
     tail_lengths = np.array([len(tails[int(end)][0]) for end in windows[1]])
     kept_steps = windows[1] - windows[0] + tail_lengths
     total = ENTRIES * (np.bincount(group) * kept_steps).sum()
-    counted("boundary elements", f"{steps} steps of {n} elements", total, "numbers", most=NUMBERS)
+    check_count(
+        "boundary elements", f"{steps} steps of {n} elements", total, "numbers", most=NUMBERS
+    )
 
     matrices = _number_entries(n)
     stretches = []

@@ -32,13 +32,22 @@ from ..core.algebra import (
     SerialMatrix,
     max_abs,
 )
-from ..core.checks import array, at, flag, function, instance, integers, optional, provides
+from ..core.checks import (
+    array,
+    describe_point,
+    flag,
+    function,
+    instance,
+    integers,
+    optional,
+    provides,
+)
 from ..core.corners import FEATURE_ANGLE
 from ..core.errors import InputError
-from ..core.obstacles import Obstacle, Touching, admissible_gap, locate_obstacle
+from ..core.obstacles import Obstacle, Touching, check_gap, locate_obstacle
 from ..core.protocols import FrictionLaw, Frictionless
 from ..core.step import StepProblem
-from ..core.surfaces import ContactSurface, nodal_frames
+from ..core.surfaces import ContactSurface, make_nodal_frames
 from ..solvers.normal.uniqueness import PMatrix, p_matrix
 from .boundary_mesh import BoundaryMesh
 from .energetic import sum_products
@@ -205,8 +214,8 @@ class BoundaryContact:
         if np.max(np.abs(directions - normals)) <= 1e-9:
             raise InputError(
                 f"BoundaryContact: the contact boundary turns by {np.degrees(turns[corner]):.3g} "
-                f"degrees at {at(points[corner])}: give conditions=conditions_on(mesh, compliance, "
-                "one side, other side), a condition on each"
+                f"degrees at {describe_point(points[corner])}: give conditions=conditions_on(mesh, "
+                "compliance, one side, other side), a condition on each"
             )
 
     @property
@@ -250,7 +259,7 @@ class BoundaryContact:
         second = self._second
         directions, _ = self._facing
         frames = np.tile(np.eye(2), (m, 1, 1))
-        frames[rows.nodes[~second]] = nodal_frames(directions[~second]).swapaxes(1, 2)
+        frames[rows.nodes[~second]] = make_nodal_frames(directions[~second]).swapaxes(1, 2)
         frames[rows.nodes[second], 1] = directions[second]
         N = np.zeros((2, m, 2, m))
         N[:, np.arange(m), :, np.arange(m)] = frames
@@ -299,7 +308,7 @@ class BoundaryContact:
             points=points,
             normals=directions,
             weights=rows.lengths,
-            gap0=admissible_gap(gap, points, size),
+            gap0=check_gap(gap, points, size),
             bilateral=np.full(count, self.bilateral),
             compliance=np.zeros(count),
             owned=owned,

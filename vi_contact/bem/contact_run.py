@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 
 from ..core.algebra import Array, Mask
-from ..core.arguments import checked
+from ..core.arguments import check_arguments
 from ..core.certificate import Certificate
 from ..core.errors import StepFailure
 from ..core.quantities import Positive, Remedy
@@ -24,7 +24,7 @@ from .poincare_steklov import work
 log = logging.getLogger(__name__)
 
 
-@checked
+@check_arguments
 def march_contact(
     contact: Annotated[BoundaryContact, Remedy("give a BoundaryContact")],
     *,

@@ -8,7 +8,7 @@ from copy import copy
 import numpy as np
 
 from ..core.algebra import Array, Indices, Mask
-from ..core.checks import at, instance
+from ..core.checks import describe_point, instance
 from ..core.errors import InputError
 from .boundary_mesh import BoundaryMesh
 from .loops import distances
@@ -109,9 +109,9 @@ class ElementPairs:
                 "angle if two sides meet near by"
             )
         raise InputError(
-            f"boundary elements: the boundary {fault} at {at(mesh.points[second])}, where elements "
-            f"{first} and {second} are {apart:.3g} m apart, less than 1/20 of the {h:.3g} m of the "
-            f"longer one; {remedy}"
+            f"boundary elements: the boundary {fault} at {describe_point(mesh.points[second])}, "
+            f"where elements {first} and {second} are {apart:.3g} m apart, less than 1/20 of the "
+            f"{h:.3g} m of the longer one; {remedy}"
         )
 
     def where(self, chosen: Mask) -> "ElementPairs":

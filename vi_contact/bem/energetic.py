@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, lu_factor, lu_solve
 
 from ..core.algebra import Array, Mask
-from ..core.checks import counted, flag, number, whole
+from ..core.checks import check_count, flag, number, whole
 from ..core.errors import InputError
 from ..laws.materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
@@ -131,7 +131,7 @@ def energetic_blocks(
     numbers = 28 * steps * n**2
     dense = numbers <= DENSE if compressed is None else not flag(owner, "compressed", compressed)
     most = NUMBERS if dense else 10 * NUMBERS
-    counted(owner, f"{steps} steps of {n} elements", numbers, "numbers", most=most)
+    check_count(owner, f"{steps} steps of {n} elements", numbers, "numbers", most=most)
     check_time_step(mesh, material.c_p, dt)
     galerkin = Galerkin(mesh, material.c_s, orders)
     speeds = (material.c_p, material.c_s)

@@ -30,10 +30,10 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve, lu_factor, lu_solve
 
 from ..core.algebra import Array, Indices, Mask, max_abs
-from ..core.checks import array, at, mask, optional, provides
+from ..core.checks import array, describe_point, mask, optional, provides
 from ..core.errors import InputError
 from ..core.protocols import FrictionLaw, Frictionless
-from ..core.surfaces import nodal_frames
+from ..core.surfaces import make_nodal_frames
 from .contact import ASYMMETRIC, SUPPORTED, BoundaryContact, Conditions
 from .energetic import sum_products
 from .loads import traction_forces
@@ -212,10 +212,10 @@ class TwoBodies:
         touching = np.flatnonzero(np.isin(self.relative.nodes, compliance.nodes))
         if conditions is None:
             places = touching
-            frames = nodal_frames(compliance.normals)
+            frames = make_nodal_frames(compliance.normals)
         else:
             places = touching[conditions.nodes]
-            frames = nodal_frames(conditions.normals)
+            frames = make_nodal_frames(conditions.normals)
 
         def part(t: float, column: int) -> Array:
             """Return the part (c,) of the jump along the normals (0) or the tangents (1)."""
@@ -259,8 +259,8 @@ def match_points(points: Array, partners: Array) -> Indices:
     worst = int(away.argmax())
     if len(points) != len(partners) or away[worst] > MATCH * np.ptp(points, axis=0).max():
         raise InputError(
-            f"TwoBodies: the node at {at(points[worst])} has no partner on the other body; give "
-            "both interfaces the same nodes"
+            f"TwoBodies: the node at {describe_point(points[worst])} has no partner on the other "
+            "body; give both interfaces the same nodes"
         )
     return nearest
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.algebra import Array
-from ..core.checks import array, counted, function, instance, mask, number, whole
+from ..core.checks import array, check_count, function, instance, mask, number, whole
 from .boundary_mesh import BoundaryMesh
 from .quadrature import MOST_POINTS
 from .rules import gauss
@@ -36,7 +36,7 @@ def traction_forces(
     function(owner, "traction", traction, "give a function (points, normals, t) -> (m, 2) in Pa")
     dt = number(owner, "dt", dt, positive=True, unit="s")
     steps = whole(owner, "steps", steps, least=1)
-    counted(owner, "steps", 2 * steps * len(mesh), "numbers")
+    check_count(owner, "steps", 2 * steps * len(mesh), "numbers")
     loaded = np.ones(len(mesh), bool)
     if elements is not None:
         loaded = mask(owner, "elements", elements, (len(mesh),))

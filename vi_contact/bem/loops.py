@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..core.algebra import Array, Indices
-from ..core.checks import at
+from ..core.checks import describe_point
 from ..core.errors import InputError
 
 TOUCHING = 1e-12  # of the size of the boundary: nearer is the same place
@@ -87,8 +87,9 @@ def check_simple(points: Array, after: Indices) -> None:
     node, element = np.unravel_index(int(distance.argmin()), distance.shape)
     if distance[node, element] <= TOUCHING * np.hypot(*np.ptp(points, axis=0)):
         raise InputError(
-            f"BoundaryMesh: the boundary crosses or touches itself at {at(points[node])}, where "
-            f"node {node} lies on element {element}; give a boundary that does not meet itself"
+            "BoundaryMesh: the boundary crosses or touches itself at "
+            f"{describe_point(points[node])}, where node {node} lies on element {element}; give a "
+            "boundary that does not meet itself"
         )
 
     def side(p: Array, q: Array, x: Array) -> Array:
@@ -114,8 +115,8 @@ def check_simple(points: Array, after: Indices) -> None:
     if crossing.any():
         i, j = np.argwhere(crossing)[0]
         raise InputError(
-            f"BoundaryMesh: the boundary crosses itself near {at(a[i])}, where elements {i} and "
-            f"{j} cross; give a boundary that does not meet itself"
+            f"BoundaryMesh: the boundary crosses itself near {describe_point(a[i])}, where "
+            f"elements {i} and {j} cross; give a boundary that does not meet itself"
         )
 
 

@@ -20,12 +20,12 @@ from ..core.algebra import Array, Indices, Mask, max_abs
 from ..core.arguments import check_fields
 from ..core.checks import (
     array,
+    find_shape,
     instance,
     integers,
     mask,
     optional,
     provides,
-    shape_of,
 )
 from ..core.errors import InputError, StepFailure
 from ..core.quantities import Positive, Unit
@@ -363,7 +363,7 @@ class BoundaryProblem:
         names = ("load_shape", "motion", "condense")
         provides(owner, "operator", self.operator, names, "give PoincareSteklov(…)")
         n = len(self.operator.mesh)
-        load_shape = self.operator.load_shape(len(shape_of(self.forces)))
+        load_shape = self.operator.load_shape(len(find_shape(self.forces)))
         forces = array(owner, "forces", self.forces, load_shape, unit="N/m")
         object.__setattr__(self, "forces", forces)
         if not len(self.forces):

@@ -177,7 +177,7 @@ class Algebra(Protocol):
             The rows (k, n of all ranks), their columns numbered over all ranks.
         """
 
-    def replaced_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
+    def replace_identity_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
         """Return the identity with some of its rows replaced.
 
         Args:
@@ -187,7 +187,7 @@ class Algebra(Protocol):
         """
 
     def factor(self, A: Matrix) -> Factor:
-        """Return a factor of A."""
+        """Return a factor of A. Collective."""
 
     def contact_last(self, A: Matrix, last: Indices) -> Any:
         """Return a factor with some unknowns last, a ``kernels.contact_last.ContactLast``.
@@ -243,8 +243,13 @@ class EffectiveMatrix:
                 self.__dict__.setdefault("factor", factor)
         return self._last[1]
 
-    def factorised_as(self, other: "EffectiveMatrix") -> "EffectiveMatrix":
-        """Return this matrix with the factors of another, whose entries are the same."""
+    def share_factors(self, other: "EffectiveMatrix") -> "EffectiveMatrix":
+        """Return this matrix with the factors of another, whose entries are the same.
+
+        Args:
+            other: a matrix that has been used already; factors that it has not made yet are not
+                shared.
+        """
         self._last = other._last
         if other.factorised:
             self.__dict__["factor"] = other.factor
@@ -395,7 +400,7 @@ class SerialAlgebra:
         """Return these owned rows of A, their columns numbered over all ranks."""
         return serial(A).csr[rows]
 
-    def replaced_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
+    def replace_identity_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
         """Return the identity with some of its rows replaced.
 
         Args:
@@ -403,7 +408,7 @@ class SerialAlgebra:
             rows: (k,) those that are replaced.
             entries: (k, n) what stands in them.
         """
-        return SerialMatrix(identity_with(n, rows, entries, first=0))
+        return SerialMatrix(build_identity_with_rows(n, rows, entries, first=0))
 
     def factor(self, A: Matrix) -> Factor:
         """Return a factor of A."""
@@ -425,7 +430,9 @@ def serial(matrix: Matrix) -> SerialMatrix:
     return matrix
 
 
-def upper_blocks(rows: sp.csr_matrix, width: int, first: int) -> tuple[Indices, Indices, Array]:
+def take_upper_blocks(
+    rows: sp.csr_matrix, width: int, first: int
+) -> tuple[Indices, Indices, Array]:
     """Return the upper triangle of a symmetric matrix as blocks, in compressed rows.
 
     Args:
@@ -440,6 +447,9 @@ def upper_blocks(rows: sp.csr_matrix, width: int, first: int) -> tuple[Indices, 
     counts = [np.zeros(1, dtype=np.int64)]
     columns = [rows.indices[:0]]
     values = [np.zeros((0, width, width))]
+
+    # Some nodes at a time, so that the blocks of their whole rows need little memory: of these only
+    # the upper ones are kept, those from the diagonal block on.
     for start in range(0, rows.shape[0], BATCH * width):
         blocks = rows[start : start + BATCH * width].tobsr((width, width))
         # The blocks come in the order in which the rows of a node name them; PETSc counts on
@@ -453,7 +463,9 @@ def upper_blocks(rows: sp.csr_matrix, width: int, first: int) -> tuple[Indices, 
     return np.cumsum(np.concatenate(counts)), np.concatenate(columns), np.concatenate(values)
 
 
-def identity_with(n: int, rows: Indices, entries: sp.csr_matrix, *, first: int) -> sp.coo_matrix:
+def build_identity_with_rows(
+    n: int, rows: Indices, entries: sp.csr_matrix, *, first: int
+) -> sp.coo_matrix:
     """Return rows of the identity, some of them replaced.
 
     Args:
@@ -462,6 +474,7 @@ def identity_with(n: int, rows: Indices, entries: sp.csr_matrix, *, first: int) 
         entries: (k, columns) what stands in them.
         first: column in which row 0 of the identity has its one.
     """
+    # Entries as (row, column, value): those of the identity first, then those that replace it.
     others = np.setdiff1d(np.arange(n), rows)
     row = np.concatenate([others, np.repeat(rows, np.diff(entries.indptr))])
     column = np.concatenate([first + others, entries.indices])

@@ -1,8 +1,14 @@
 """Check the arguments of public functions against their types: a sentence, and no traceback.
 
-``@checked`` is for functions that users call with their own values, and that look at these before
-any other function does; ``check_fields`` is for dataclasses. Both check the limits of numbers that
-annotations mark: ``core.quantities``.
+``@check_arguments`` is for functions that users call with their own values, and that look at these
+before any other function does; ``check_fields`` is for dataclasses. Both check the limits of
+numbers that annotations mark: ``core.quantities``.
+
+``fits`` is the heart: it looks a type up in two tables, ``_SIMPLE`` and ``_MADE_OF`` at the end of
+the file, and asks what a value is made of by itself. Types are read as a user means them: ``float``
+takes whole numbers, ``int`` takes 3.0 and not True, a tuple or an array may come as a list, and an
+array of numbers as anything that numpy makes one of. ``describe_type`` has the words of each type
+for the sentence.
 """
 
 import math
@@ -19,42 +25,44 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from .checks import real, shape_of, shown, suggest_object
+from .checks import find_shape, quote, real, suggest_object
 from .errors import InputError
-from .quantities import Between, Quantity, quantities
+from .quantities import Between, Quantity, read_quantities
 
 _PLURALS: dict[Any, str] = {float: "real numbers", int: "whole numbers", str: "texts"}
 P = ParamSpec("P")
 R = TypeVar("R")
 
 
-def checked(function: Callable[P, R]) -> Callable[P, R]:
+def check_arguments(function: Callable[P, R]) -> Callable[P, R]:
     """Return the function with a check of its arguments.
 
     The check raises InputError for an argument that is not of its type, or beyond the limits that
     its annotation marks (``core.quantities``).
     """
     owner = function.__qualname__
-    get_parameters = cache(lambda: _parameters(function))  # classes may follow
+    # Annotations are read at the first call and not here: they may name classes that come later in
+    # the module.
+    get_parameters = cache(lambda: _read_parameters(function))
 
     @wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> R:
         own_signature, quantity_of = get_parameters()
         for name, value in own_signature.bind(*args, **kwargs).arguments.items():
             if name in quantity_of:
-                _check(owner, name, value, quantity_of[name])
+                _check_quantity(owner, name, value, quantity_of[name])
         return function(*args, **kwargs)
 
     return call
 
 
-def _parameters(function: Callable[..., Any]) -> tuple[Signature, dict[str, Quantity]]:
+def _read_parameters(function: Callable[..., Any]) -> tuple[Signature, dict[str, Quantity]]:
     """Return the signature, and what the annotation of each parameter asks for.
 
     Parameters that collect others, such as ``*args``, are left out.
     """
     own_signature = signature(function)
-    quantity_of = quantities(function)
+    quantity_of = read_quantities(function)
     collecting = (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD)
     names = [
         name
@@ -71,19 +79,19 @@ def check_fields(value: Any) -> None:
     (``core.quantities``). Call it in ``__post_init__``.
     """
     kind: Any = type(value)
-    for name, quantity in _fields(kind):
-        _check(kind.__name__, name, getattr(value, name), quantity)
+    for name, quantity in _read_fields(kind):
+        _check_quantity(kind.__name__, name, getattr(value, name), quantity)
 
 
 @cache
-def _fields(kind: Any) -> tuple[tuple[str, Quantity], ...]:
+def _read_fields(kind: Any) -> tuple[tuple[str, Quantity], ...]:
     """Return what the annotation of each field of a dataclass asks for."""
-    quantity_of = quantities(kind)
+    quantity_of = read_quantities(kind)
     names = [field.name for field in fields(kind) if field.name in quantity_of]
     return tuple((name, quantity_of[name]) for name in names)
 
 
-def check(owner: str, meaning: str, value: Any, kind: Any) -> None:
+def check_type(owner: str, meaning: str, value: Any, kind: Any) -> None:
     """Raise InputError unless the value is of a type.
 
     Args:
@@ -93,10 +101,10 @@ def check(owner: str, meaning: str, value: Any, kind: Any) -> None:
         kind: the type, as annotations have it.
     """
     if not fits(value, kind):
-        raise InputError(f"{owner}: {meaning} is {shown(value)}; give {words(kind)}")
+        raise InputError(f"{owner}: {meaning} is {quote(value)}; give {describe_type(kind)}")
 
 
-def _check(owner: str, name: str, value: Any, quantity: Quantity) -> None:
+def _check_quantity(owner: str, name: str, value: Any, quantity: Quantity) -> None:
     """Raise InputError unless the value is of its type and within its limits.
 
     Args:
@@ -113,12 +121,12 @@ def _check(owner: str, name: str, value: Any, quantity: Quantity) -> None:
     # Of a single number, type and limit are one question, with one sentence.
     number_kind = None if limit is None else _single_number(kind)
     if number_kind is None and not fits(value, kind):
-        remedy = f"give {words(kind)}"
+        remedy = f"give {describe_type(kind)}"
         if quantity.other is not None:
             remedy = f"{suggest_object(value)}{quantity.other.text}"
         elif limit is not None and limit.remedy:
             remedy = limit.remedy
-        raise InputError(f"{owner}: {quantity.named(name)} is {shown(value)}; {remedy}")
+        raise InputError(f"{owner}: {quantity.describe(name)} is {quote(value)}; {remedy}")
     if limit is None or (value is None and type(None) in _members(kind)):
         return
 
@@ -128,12 +136,12 @@ def _check(owner: str, name: str, value: Any, quantity: Quantity) -> None:
     else:
         place, wrong = _locate_beyond(value, limit)
     if place is not None:
-        defect = f"{quantity.named(name)}{place} is {shown(wrong)}"
+        defect = f"{quantity.describe(name)}{place} is {quote(wrong)}"
         raise InputError(f"{owner}: {defect}; {quantity.remedy(number_kind is int)}")
 
 
 def _holds(value: Any, limit: Between, kind: type) -> bool:
-    """Return whether a value is a number, or a whole one where ``kind`` is int, within a limit."""
+    """Return whether a value is a number within a limit, and a whole one where ``kind`` is int."""
     number = real(value)
     return limit.holds(number) and (kind is float or number == math.floor(number))
 
@@ -180,7 +188,13 @@ def _locate_beyond(value: Any, limit: Between) -> tuple[str | None, Any]:
 
 
 def fits(value: Any, kind: Any) -> bool:
-    """Return whether a value is of a type; every value is of a type that is not understood."""
+    """Return whether a value is of a type; every value is of a type that is not understood.
+
+    Args:
+        value: what the user gave.
+        kind: the type, as an annotation has it, without marks.
+    """
+    # Of list[int], for example, the origin is list, and int stands inside.
     origin = typing.get_origin(kind)
     inside = typing.get_args(kind)
     if kind is Any:
@@ -206,7 +220,13 @@ def _fits_one_of(value: Any, kinds: tuple[Any, ...]) -> bool:
 
 
 def _fits_object(value: Any, kind: Any, origin: Any) -> bool:
-    """Return whether a value is a function, satisfies a protocol, or is of a class."""
+    """Return whether a value is a function, satisfies a protocol, or is of a class.
+
+    Args:
+        value: what the user gave.
+        kind: a type that is in no table.
+        origin: the type without its brackets; None where it has none.
+    """
     if kind is Callable or origin is Callable:
         return callable(value) and not isclass(value)
     protocol = kind if origin is None else origin  # without what stands in its brackets
@@ -216,13 +236,13 @@ def _fits_object(value: Any, kind: Any, origin: Any) -> bool:
     return isinstance(value, kind) if isclass(kind) and origin is None else True
 
 
-def words(kind: Any) -> str:
-    """Return the words for a type in a sentence."""
+def describe_type(kind: Any) -> str:
+    """Return the words for a type in a sentence, such as "whole numbers in a list or None"."""
     origin = typing.get_origin(kind)
     inside = typing.get_args(kind)
     if _is_union(kind):
         is_path = any(map(_is_path, inside))
-        texts = [words(member) for member in inside if not (is_path and member is str)]
+        texts = [describe_type(member) for member in inside if not (is_path and member is str)]
         return " or ".join(dict.fromkeys(texts))
     if kind is None or kind is type(None):
         return "None"
@@ -230,11 +250,12 @@ def words(kind: Any) -> str:
         return "a path"
     if origin is np.ndarray:
         return "real numbers in a list or array"
+    # A tuple of some length, of one type or of several; with an ellipsis of any length.
     if origin is tuple:
         count = "" if inside[-1] is Ellipsis else f"{len(inside)} "
         if len(set(inside) - {Ellipsis}) == 1:
             return f"{count}{_PLURALS.get(inside[0], 'values')} in a tuple"
-        return f"a tuple of {', '.join(map(words, inside))}"
+        return f"a tuple of {', '.join(map(describe_type, inside))}"
     if origin in (Sequence, Iterable, list):
         return f"{_PLURALS.get(inside[0], 'values')} in a list"
     if origin in (Mapping, dict):
@@ -278,7 +299,7 @@ def _is_whole(value: Any) -> bool:
 
 def _are_numbers(value: Any) -> bool:
     """Return whether a value is a number, or numbers in lists or arrays of equal lengths."""
-    if isinstance(value, str | bytes) or shape_of(value) == (-1,):
+    if isinstance(value, str | bytes) or find_shape(value) == (-1,):
         return False
     return np.asarray(value).dtype.kind in "iufb"
 
@@ -311,6 +332,7 @@ def _fits_mapping(value: Any, inside: tuple[Any, ...]) -> bool:
     return all(fits(key, inside[0]) and fits(value[key], inside[1]) for key in value)
 
 
+# Type -> whether a value is of it.
 _SIMPLE: dict[Any, Callable[[Any], bool]] = {
     float: _is_number,
     int: _is_whole,
@@ -318,6 +340,7 @@ _SIMPLE: dict[Any, Callable[[Any], bool]] = {
     bool: lambda value: isinstance(value, bool | np.bool_),
     np.ndarray: _are_numbers,
 }
+# Type without its brackets -> whether a value is of it, given the types inside the brackets.
 _MADE_OF: dict[Any, Callable[[Any, tuple[Any, ...]], bool]] = {
     np.ndarray: lambda value, _: _are_numbers(value),
     tuple: _fits_tuple,

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from .algebra import Array
-from .checks import place_in_words
+from .checks import describe_point
 
 NAMED = 3  # places of a kind that are named
 # kind -> what that means for the conditions
@@ -54,7 +54,7 @@ class Census:
     def _describe(self, kind: str, points: Array) -> str:
         """Return how many nodes of a kind there are, and the first places of theirs (k, d) [m]."""
         meaning = f" ({MEANINGS[kind]})" if kind in MEANINGS else ""
-        named = ", ".join(map(place_in_words, points[:NAMED]))
+        named = ", ".join(map(describe_point, points[:NAMED]))
         more = f" and {len(points) - NAMED} more places" if len(points) > NAMED else ""
         nodes = "1 node" if len(points) == 1 else f"{len(points)} nodes"
         return f"{nodes} {kind}{meaning}, at {named}{more}"

@@ -2,7 +2,18 @@
 
 Every constructor and every entry point of the package asks here, before any work is done. A check
 returns the value in the type that the caller goes on with, so that one line reads and checks an
-argument.
+argument:
+
+    dt = number("march", "dt", dt, positive=True, unit="s")
+
+Such a check is named by what it returns, as ``float`` and ``int`` are: ``number``, ``whole``,
+``flag``, ``array`` and the like. Its first arguments are ``owner``, who asks; ``meaning``, what the
+value is in words; and the value. Together they make the sentence "owner: meaning is value; give …".
+A check that returns nothing is a verb. Arguments whose limits stand in annotations are
+checked by ``core.arguments`` instead.
+
+``refuse`` and ``on_all`` raise on all ranks what is wrong on one: otherwise the others would wait
+for ever in the next collective call.
 """
 
 import math
@@ -16,11 +27,11 @@ from typing import Any, TypeVar
 import numpy as np
 
 from .algebra import Array, Comm, Indices, Mask, largest
-from .errors import InputError, ViContactError, of_machine
+from .errors import InputError, ViContactError, is_of_machine
 
 T = TypeVar("T")
 
-SHOWN = 60  # characters of a value in a sentence
+SHOWN = 60  # characters of a value in a sentence, at most
 LARGEST = 50_000_000  # numbers in one array that an input may ask for: 400 MB
 MOST_CELLS = 20_000_000  # of a mesh made here: Gmsh takes some kilobytes for each
 LARGEST_WHOLE = 2.0**53  # beyond it not every whole number is a float
@@ -56,10 +67,11 @@ def number(
     if unit:
         wanted += f" in {unit}"
 
+    # NaN stands for what is no number, and is refused as such.
     result = real(value)
     too_low = (positive and result <= 0.0) or (not_negative and result < 0.0)
     if too_low or not math.isfinite(result):
-        raise InputError(f"{owner}: {meaning} is {shown(value)}; give {wanted}")
+        raise InputError(f"{owner}: {meaning} is {quote(value)}; give {wanted}")
     return result
 
 
@@ -81,7 +93,7 @@ def whole(owner: str, meaning: str, value: Any, *, least: int = 0, most: int | N
     if not math.isfinite(result) or result != int(result) or not least <= result <= upper:
         limit = "" if most is None else f" and at most {most}"
         raise InputError(
-            f"{owner}: {meaning} is {shown(value)}; give a whole number of at least {least}{limit}"
+            f"{owner}: {meaning} is {quote(value)}; give a whole number of at least {least}{limit}"
         )
     return int(value)
 
@@ -95,10 +107,10 @@ def check_word(name: str, given: object, known: Sequence[str]) -> None:
         known: the words to choose from.
     """
     if not isinstance(given, str) or given not in known:  # an array compares element by element
-        raise InputError(f"unknown {name} {shown(str(given))}: choose one of {', '.join(known)}")
+        raise InputError(f"unknown {name} {quote(str(given))}: choose one of {', '.join(known)}")
 
 
-def counted(
+def check_count(
     owner: str, asked: str, value: Any, things: str = "samples", *, most: int = LARGEST
 ) -> int:
     """Return how many things an input asks for, before memory is taken for them.
@@ -135,7 +147,7 @@ def flag(owner: str, meaning: str, value: Any) -> bool:
     """
     if isinstance(value, bool | np.bool_):
         return bool(value)
-    raise InputError(f"{owner}: {meaning} is {shown(value)}; give True or False")
+    raise InputError(f"{owner}: {meaning} is {quote(value)}; give True or False")
 
 
 def function(owner: str, meaning: str, value: Any, remedy: str) -> Any:
@@ -152,7 +164,7 @@ def function(owner: str, meaning: str, value: Any, remedy: str) -> Any:
     """
     if callable(value) and not isinstance(value, type):
         return value
-    raise InputError(f"{owner}: {meaning} is {shown(value)}; {suggest_object(value)}{remedy}")
+    raise InputError(f"{owner}: {meaning} is {quote(value)}; {suggest_object(value)}{remedy}")
 
 
 def column_name(kind: str, name: Any) -> str:
@@ -164,7 +176,7 @@ def column_name(kind: str, name: Any) -> str:
     if isinstance(name, str | int) and re.fullmatch(r"\w+", str(name), re.ASCII):
         return str(name)
     raise InputError(
-        f"{kind} {shown(name)}: use letters, digits and underscores for names of columns"
+        f"{kind} {quote(name)}: use letters, digits and underscores for names of columns"
     )
 
 
@@ -182,7 +194,7 @@ def several(owner: str, meaning: str, value: Any, remedy: str) -> tuple[Any, ...
     """
     if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes):
         return tuple(value)
-    raise InputError(f"{owner}: {meaning} is {shown(value)}; {suggest_object(value)}{remedy}")
+    raise InputError(f"{owner}: {meaning} is {quote(value)}; {suggest_object(value)}{remedy}")
 
 
 def instance(
@@ -202,7 +214,7 @@ def instance(
     """
     if isinstance(value, kinds):
         return value
-    raise InputError(f"{owner}: {meaning} is {shown(value)}; {suggest_object(value)}{remedy}")
+    raise InputError(f"{owner}: {meaning} is {quote(value)}; {suggest_object(value)}{remedy}")
 
 
 def provides(
@@ -231,7 +243,7 @@ def provides(
     has_other = any(hasattr(value, name) for name in lacks)
     if has_all and not has_other and not isinstance(value, type):
         return value
-    raise InputError(f"{owner}: {meaning} is {shown(value)}; {suggest_object(value)}{remedy}")
+    raise InputError(f"{owner}: {meaning} is {quote(value)}; {suggest_object(value)}{remedy}")
 
 
 def array(
@@ -249,9 +261,12 @@ def array(
     Raises:
         InputError: other shapes, what are no real numbers, NaN and infinite values.
     """
+    # The shape in words, as numpy writes it, with "any" for any length.
     lengths = ", ".join("any" if n is None else str(n) for n in shape)
     wanted = f"({lengths},)" if len(shape) == 1 else f"({lengths})"
     unit = f" in {unit}" if unit else ""
+
+    # First the type: numpy raises for lists of different lengths, and makes objects of the rest.
     try:
         raw = np.asarray(value)
         if raw.dtype.kind not in "iuf":
@@ -259,8 +274,10 @@ def array(
         values = raw.astype(float)
     except (TypeError, ValueError):
         raise InputError(
-            f"{owner}: {meaning} is {shown(value)}; give real numbers of shape {wanted}{unit}"
+            f"{owner}: {meaning} is {quote(value)}; give real numbers of shape {wanted}{unit}"
         ) from None
+
+    # Then the shape, and last the values, so that the sentence names the first thing to put right.
     if values.ndim != len(shape) or any(
         n is not None and n != m for n, m in zip(shape, values.shape, strict=True)
     ):
@@ -290,7 +307,7 @@ def optional(
         check(owner, meaning, value, *more, **options)
 
 
-def shape_of(value: Any) -> tuple[int, ...]:
+def find_shape(value: Any) -> tuple[int, ...]:
     """Return the shape of numbers in lists or arrays.
 
     Lists of different lengths have no shape; (-1,) stands for it.
@@ -315,7 +332,7 @@ def integers(owner: str, meaning: str, value: Any, shape: tuple[int | None, ...]
     """
     values = array(owner, meaning, value, shape)
     if np.any(values != np.rint(values)) or np.any(np.abs(values) > LARGEST_WHOLE):
-        raise InputError(f"{owner}: {meaning} is {shown(value)}; give whole numbers")
+        raise InputError(f"{owner}: {meaning} is {quote(value)}; give whole numbers")
     return values.astype(np.int64)
 
 
@@ -337,7 +354,7 @@ def mask(owner: str, meaning: str, value: Any, shape: tuple[int, ...]) -> Mask:
         values = np.empty(0)
     if values.dtype == bool and values.shape == shape:
         return values
-    defect = f"has shape {values.shape}" if values.dtype == bool else f"is {shown(value)}"
+    defect = f"has shape {values.shape}" if values.dtype == bool else f"is {quote(value)}"
     raise InputError(f"{owner}: {meaning} {defect}; give a boolean mask of shape {shape}")
 
 
@@ -353,16 +370,16 @@ def path(owner: str, meaning: str, value: Any) -> Path:
         InputError: what is no path, and an empty one.
     """
     if not isinstance(value, str | Path) or not str(value).strip() or "\0" in str(value):
-        raise InputError(f"{owner}: {meaning} is {shown(value)}; give the path of a file")
+        raise InputError(f"{owner}: {meaning} is {quote(value)}; give the path of a file")
     return Path(value)
 
 
-def place_in_words(point: Array) -> str:
+def describe_point(point: Array) -> str:
     """Return a point, or a direction, as words for a sentence: (1, 0.5)."""
     return f"({', '.join(f'{x:g}' for x in point)})"
 
 
-def shown(value: Any) -> str:
+def quote(value: Any) -> str:
     """Return the value for a sentence: short, on one line, also where its own repr fails."""
     if isinstance(value, type):
         return f"the class {value.__name__}"
@@ -403,6 +420,7 @@ def refuse(defects: Iterable[str], comm: Comm) -> None:
         defects: texts of this rank, "" for no defect.
         comm: the ranks that are asked.
     """
+    # One number tells all ranks whether there is any text; only then are texts sent.
     mine = next((text for text in defects if text), "")
     if largest(comm, bool(mine)):
         texts = comm.bcast(comm.gather(mine))
@@ -421,7 +439,7 @@ def explain_error(name: str, error: Exception) -> str:
     frame = traceback.extract_tb(error.__traceback__)[-1]
     place = f"{Path(frame.filename).name}, line {frame.lineno}"
     ending = f"{name} ended in {type(error).__name__}: {error} ({place})"
-    if of_machine(error):
+    if is_of_machine(error):
         return f"{ending}: the machine refused it"
     if isinstance(error, ViContactError):
         return str(error)
@@ -439,6 +457,7 @@ def on_all(comm: Comm, name: str, call: Callable[[], T]) -> T:
     Raises:
         InputError: on all ranks, where the call raises on one.
     """
+    # The answer stands in a list, as it may be None itself.
     results = []
     failure = None
     try:
@@ -453,6 +472,3 @@ def on_all(comm: Comm, name: str, call: Callable[[], T]) -> T:
         # Whoever prints it sees what it came from, such as a lack of memory.
         raise error from failure
     return results[0]
-
-
-at = place_in_words  # the name by which other rooms still call it

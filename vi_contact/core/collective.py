@@ -18,12 +18,12 @@ from dataclasses import fields, is_dataclass
 from enum import Enum
 from hashlib import sha256
 from pathlib import PurePath
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 
 from .algebra import Comm, from_each, largest
-from .checks import explain_error, shown
+from .checks import explain_error, quote
 from .errors import InputError, StepFailure, ViContactError
 
 T = TypeVar("T")
@@ -54,17 +54,17 @@ def together(comm: Comm) -> AbstractContextManager[None]:
 @contextmanager
 def _frame(comm: Comm) -> Iterator[None]:
     """Open the frame of ``together`` on several ranks."""
-    kept: list[ViContactError] = []
+    errors: list[ViContactError] = []  # what ``call_user`` keeps
     broken: Exception | None = None
-    _OPEN.append(kept)
+    _OPEN.append(errors)
     try:
         yield
     except Exception as error:
         broken = error
     finally:
         _OPEN.pop()
-    if largest(comm, broken is not None or bool(kept)):
-        raise _choose_error(comm, kept[0] if kept else None, broken)
+    if largest(comm, broken is not None or bool(errors)):
+        raise _choose_error(comm, errors[0] if errors else None, broken)
 
 
 def together_if_own(comm: Comm, value: Any) -> AbstractContextManager[None]:
@@ -93,27 +93,27 @@ def _choose_error(comm: Comm, kept: ViContactError | None, broken: Exception | N
         kept: the first error that ``call_user`` kept on this rank.
         broken: what ended the frame on this rank.
     """
-    own: Any = kept or broken
+    # Tell the other ranks of the error of this one, in texts: not every error can be sent.
+    error: Any = kept or broken
     message = None
-    if own is not None:
-        kinds = [number for number, kind in enumerate(SHARED_KINDS) if isinstance(own, kind)]
+    if error is not None:
+        kinds = [number for number, kind in enumerate(SHARED_KINDS) if isinstance(error, kind)]
         kind = kinds[0] if kinds else None
-        message = _RankError(kept is not None, kind, str(own), repr(own))
+        message = _RankError(kept is not None, kind, str(error), repr(error))
     messages = from_each(comm, message)
-    errors = [(rank, error) for rank, error in enumerate(messages) if error is not None]
+    errors = [(rank, answer) for rank, answer in enumerate(messages) if answer is not None]
 
     # Kept errors come before others, and lower ranks before higher ones.
     rank, first = min(errors, key=lambda pair: (not pair[1].kept, pair[0]))
-    if own is None or (kept is None and first.kept):
+    if error is None or (kept is None and first.kept):
         foreign: Any = ViContactError(f"rank {rank}: {first.repr}")
         if first.kind is not None:
             foreign = SHARED_KINDS[first.kind](first.text)
-        foreign.__cause__ = own
-        own = foreign
-    own = getattr(own, "as_it_is", own)
-    own.on_all_ranks = True  # all of them raise: what follows may be collective
-    error: Exception = own
-    return error
+        foreign.__cause__ = error
+        error = foreign
+    chosen: Any = getattr(error, "as_it_is", error)
+    chosen.on_all_ranks = True  # all of them raise: what follows may be collective
+    return cast(Exception, chosen)
 
 
 def call_user(name: str, call: Callable[[], T], instead: T, *, as_it_is: bool = False) -> T:
@@ -162,7 +162,7 @@ def keep_error(name: str, error: Exception, instead: T) -> T:
     return instead
 
 
-def limit_of(law: Any, r_n: Any, weights: Any, scale: float) -> Any:
+def ask_limit(law: Any, r_n: Any, weights: Any, scale: float) -> Any:
     """Return the friction limit of a law (m,), by ``call_user`` as the law may be the user's own.
 
     Args:
@@ -178,8 +178,8 @@ def limit_of(law: Any, r_n: Any, weights: Any, scale: float) -> Any:
     )
 
 
-def slope_of(law: Any, weights: Any) -> Any:
-    """Return the slope of the friction limit of a law (m,), as ``limit_of`` does."""
+def ask_slope(law: Any, weights: Any) -> Any:
+    """Return the slope of the friction limit of a law (m,), as ``ask_limit`` does."""
     return call_user(
         f"the friction law {type(law).__name__}",
         lambda: law.slope(weights),
@@ -202,29 +202,30 @@ def agree(comm: Comm, owner: str, given: Mapping[str, Any]) -> None:
     if comm.size == 1:
         return
     texts = {name: _describe(value, DEPTH) for name, value in given.items()}
-    own = {name: sha256(text.encode()).digest()[:8] for name, text in texts.items()}
+    digest_of = {name: sha256(text.encode()).digest()[:8] for name, text in texts.items()}
 
     # One reduction of two numbers tells whether all are alike: the largest digest is the smallest
     # one, too. 48 bits are a whole number that a float holds.
-    whole = sha256(repr(tuple(own.items())).encode()).digest()[:6]
+    whole = sha256(repr(tuple(digest_of.items())).encode()).digest()[:6]
     digest_of_all = float(int.from_bytes(whole, "big"))
     highest, lowest = comm.max(np.array([digest_of_all, -digest_of_all]))
     if highest == -lowest:
         return
 
     # Otherwise find the first argument that is not the same, and the ranks on which it is not.
-    digests = from_each(comm, tuple(own.items()))
+    digests = from_each(comm, tuple(digest_of.items()))
     for place, (name, digest) in enumerate(digests[0]):
-        others = [rank for rank, theirs in enumerate(digests) if theirs[place] != (name, digest)]
-        if others:
-            values = from_each(comm, shown(given[name]))
-            apart = "is not the same on rank 0 and"
-            if values[others[0]] != values[0]:
-                apart = f"is {values[0]} on rank 0 and {values[others[0]]}"
-            ranks = "ranks " + ", ".join(map(str, others))
-            if len(others) == 1:
-                ranks = f"rank {others[0]}"
-            raise InputError(f"{owner}: {name} {apart} on {ranks}; give the same on all ranks")
+        apart = [rank for rank, theirs in enumerate(digests) if theirs[place] != (name, digest)]
+        if apart:
+            # Long values may be quoted alike and differ all the same.
+            values = from_each(comm, quote(given[name]))
+            difference = "is not the same on rank 0 and"
+            if values[apart[0]] != values[0]:
+                difference = f"is {values[0]} on rank 0 and {values[apart[0]]}"
+            ranks = "ranks " + ", ".join(map(str, apart))
+            if len(apart) == 1:
+                ranks = f"rank {apart[0]}"
+            raise InputError(f"{owner}: {name} {difference} on {ranks}; give the same on all ranks")
 
 
 class Parts:
@@ -249,6 +250,8 @@ def _describe(value: Any, depth: int, parts: bool = False) -> str:
         parts: whether each rank may hold its part of lists and arrays.
     """
     kind = f"{type(value).__module__}.{type(value).__qualname__}"
+
+    # Single values: their text, where 1 and 1.0 are the same number.
     if isinstance(value, Parts):
         return _describe(value.value, depth, parts=True)
     if isinstance(value, Enum):
@@ -258,6 +261,8 @@ def _describe(value: Any, depth: int, parts: bool = False) -> str:
     if isinstance(value, int | float | complex | np.number):
         number: Any = value
         return repr(complex(number)) if abs(number) < EXACT else repr(number)
+
+    # Values made of others: the texts of these; of functions and all other objects the type.
     if depth == 0:
         return kind
     if isinstance(value, list | tuple | np.ndarray):

@@ -10,14 +10,14 @@ from itertools import chain, permutations
 import numpy as np
 
 from .algebra import Array, Indices, from_each
-from .checks import place_in_words
+from .checks import describe_point
 from .errors import InputError
 from .surfaces import (
     ContactSurface,
+    arrange_frames,
     group_same_nodes,
-    nodal_blocks,
-    nodal_frames,
-    tangential_columns,
+    list_tangential_columns,
+    make_nodal_frames,
 )
 
 # CHOSEN: 30°, a usual feature angle; the coarsest circles of the models turn by less
@@ -33,7 +33,7 @@ def are_orthogonal(directions: Array) -> bool:
     return bool(np.all(np.abs(cosines)[pairs] <= PARALLEL))
 
 
-def corner_frame(directions: Array) -> tuple[list[int], Array]:
+def make_corner_frame(directions: Array) -> tuple[list[int], Array]:
     """Return the frame of a node with several contact directions.
 
     Args:
@@ -68,7 +68,7 @@ def corner_frame(directions: Array) -> tuple[list[int], Array]:
     return columns, block
 
 
-def tangent_vectors(normals: Array, nodes: Indices | None) -> Array:
+def make_tangent_vectors(normals: Array, nodes: Indices | None) -> Array:
     """Return the tangents along which slip and r_t are measured, (m, d, d - 1).
 
     Those of a node with several contact directions are the other vectors of its frame.
@@ -77,16 +77,16 @@ def tangent_vectors(normals: Array, nodes: Indices | None) -> Array:
         normals: contact directions (m, d).
         nodes: numbers of their nodes (m,); None for one node each.
     """
-    column, blocks = nodal_blocks(nodal_frames(normals))
+    column, blocks = arrange_frames(make_nodal_frames(normals))
     corners = () if nodes is None else group_same_nodes(nodes)
     for rows in corners:
         if np.linalg.matrix_rank(normals[rows]) == len(rows):  # else two nodes at one place
-            column[rows], blocks[rows] = corner_frame(normals[rows])
-    tangents = tangential_columns(column, normals.shape[1])
+            column[rows], blocks[rows] = make_corner_frame(normals[rows])
+    tangents = list_tangential_columns(column, normals.shape[1])
     return np.take_along_axis(blocks, tangents[:, None, :], axis=2)
 
 
-def oblique_corners(surface: ContactSurface) -> list[Indices]:
+def find_oblique_corners(surface: ContactSurface) -> list[Indices]:
     """Return the conditions of each node with directions that are not at right angles."""
     if surface.dual is None:
         return []
@@ -103,7 +103,7 @@ def refuse_rubbing(surface: ContactSurface) -> None:
     if corners:
         _, point = min(corners, key=lambda corner: corner[0])
         raise InputError(
-            f"{len(corners)} contact nodes, the first at {place_in_words(point)}, have several "
+            f"{len(corners)} contact nodes, the first at {describe_point(point)}, have several "
             "contact directions, and friction on two faces at once is not modelled: let them slide "
             "freely (surface.with_frictionless_corners()), or treat the corner as smooth (a larger "
             "feature_angle=)"
@@ -121,7 +121,7 @@ def with_open_faces(surface: ContactSurface, v: Array, target: Array) -> Array:
         v: velocities (n,) [m/s] before the impact law, or rows (k, n).
         target: normal velocities (m,) [m/s] of closed faces, NaN for open ones; or rows (k, m).
     """
-    corners = oblique_corners(surface)
+    corners = find_oblique_corners(surface)
     if not corners:
         return target
     if v.ndim == 2:
@@ -141,7 +141,7 @@ def with_open_faces(surface: ContactSurface, v: Array, target: Array) -> Array:
     return target
 
 
-def lumped_entries(surface: ContactSurface, nodal: Array) -> tuple[Indices, Indices, Array]:
+def lump_masses(surface: ContactSurface, nodal: Array) -> tuple[Indices, Indices, Array]:
     """Return (rows, columns, values) of a lumped mass matrix.
 
     It is diagonal, but m G⁻¹ at oblique corners.
@@ -150,16 +150,18 @@ def lumped_entries(surface: ContactSurface, nodal: Array) -> tuple[Indices, Indi
         surface: the contact conditions.
         nodal: masses (n,) [kg] of the unknowns.
     """
+    # The diagonal, from which the unknowns of oblique corners are taken out, and a small full block
+    # for each of these corners.
     diagonal = np.arange(len(nodal))
-    own = nodal.copy()
+    on_diagonal = nodal.copy()
     rows = [diagonal]
     columns = [diagonal]
-    values = [own]
-    for corner in oblique_corners(surface):
+    values = [on_diagonal]
+    for corner in find_oblique_corners(surface):
         unknowns = surface.owned[corner]
         cosines = surface.normals[corner] @ surface.normals[corner].T
         masses = np.sqrt(np.outer(nodal[unknowns], nodal[unknowns]))
-        own[unknowns] = 0.0
+        on_diagonal[unknowns] = 0.0
         rows.append(np.repeat(unknowns, len(unknowns)))
         columns.append(np.tile(unknowns, len(unknowns)))
         values.append((masses * np.linalg.inv(cosines)).ravel())

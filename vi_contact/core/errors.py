@@ -73,7 +73,7 @@ class OutOfTime(Interrupted):
         self.status = 75
 
 
-def of_memory(error: BaseException) -> bool:
+def is_of_memory(error: BaseException) -> bool:
     """Say whether an error, or one it came from, is that there is no memory.
 
     Errors of Python, numpy, HDF5 and PETSc are known.
@@ -94,13 +94,13 @@ def _lacks_memory(error: BaseException) -> bool:
     return any(words in text for words in _MEMORY)
 
 
-def of_machine(error: BaseException) -> bool:
+def is_of_machine(error: BaseException) -> bool:
     """Say whether an error comes from the machine: from memory, permissions, open files.
 
     Such an error says nothing of what a file holds. A handler that takes other errors for the
     damage of a file raises these again.
     """
-    return of_memory(error) or (isinstance(error, OSError) and error.errno in _MACHINE)
+    return is_of_memory(error) or (isinstance(error, OSError) and error.errno in _MACHINE)
 
 
 def _causes(error: BaseException | None) -> Iterator[BaseException]:

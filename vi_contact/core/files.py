@@ -20,7 +20,7 @@ import numpy as np
 from .algebra import Comm
 from .errors import ViContactError
 from .hdf5 import StoredFile
-from .own_files import inner_folder, is_stream, open_new, open_to_read, remove, temporary_of
+from .own_files import inner_folder, is_stream, name_temporary, open_new, open_to_read, remove
 
 T = TypeVar("T")
 
@@ -37,7 +37,7 @@ FRAME = re.compile(r"frame_(\d{6,})\.h5")  # a file of one frame, with the numbe
 FRAMES = re.compile(r"frames_\d{6,}\.h5")  # a file of several frames, each in a group of its step
 
 
-def frames_of(folder: Path) -> dict[int, tuple[Path, str]]:
+def list_frames(folder: Path) -> dict[int, tuple[Path, str]]:
     """Return where the frames of an XDMF series in a run folder are.
 
     Returns:
@@ -72,7 +72,7 @@ def on_root(comm: Comm, action: Callable[[], T]) -> T | None:
         try:
             value = action()
         except OSError as error:
-            failure = ViContactError(sentence(error))
+            failure = ViContactError(describe_os_error(error))
             failure.__cause__ = error
         except Exception as error:  # the other ranks must not wait for this one
             failure = error
@@ -91,9 +91,11 @@ def on_root(comm: Comm, action: Callable[[], T]) -> T | None:
     return value
 
 
-def sentence(error: OSError) -> str:
+def describe_os_error(error: OSError) -> str:
     """Return one sentence: what happened to which file, and the remedy."""
     path = "a file" if error.filename is None else f"'{os.fsdecode(error.filename)}'"
+
+    # Causes with a remedy of their own come first.
     if error.errno in _FULL:
         return (
             f"the disk is full: {path} could not be written; what was written before is kept, free "
@@ -201,7 +203,7 @@ def write_csv(path: str | Path, header: Sequence[str], rows: Iterable[Sequence[A
     try:
         write_output(path, text.getvalue().encode())
     except OSError as error:
-        raise ViContactError(sentence(error)) from error
+        raise ViContactError(describe_os_error(error)) from error
     return Path(path)
 
 
@@ -232,7 +234,7 @@ def _replace_when_complete(path: Path, safe: bool = True) -> Iterator[Any]:
     Raises:
         OSError: names ``path``.
     """
-    temporary = temporary_of(path)
+    temporary = name_temporary(path)
     try:
         with open_new(temporary) as file:
             yield file

@@ -49,6 +49,7 @@ class StoredGroup:
         """Return a group or data set of this group; its link is checked before it is followed."""
         import h5py  # late: no step needs it
 
+        # The link itself is asked for and not followed: a soft or external one leads elsewhere.
         link = self._group.get(name, getlink=True)
         if link is None:
             raise KeyError(name)
@@ -59,17 +60,19 @@ class StoredGroup:
             return StoredGroup(self._path, item, self._size)
         if not isinstance(item, h5py.Dataset):
             raise self._damage(name, "is no array of numbers of this file")
+
+        # Numbers that are stored in other files, or more of them than this file can have packed.
         if item.external is not None or item.is_virtual:
             raise self._damage(name, "lies in another file")
         if item.dtype.kind not in _NUMBERS or item.nbytes > DENSEST * self._size:
             raise self._damage(name, "is no array of numbers of this file")
         return item
 
-    def _damage(self, name: str, what: str) -> InputError:
+    def _damage(self, name: str, defect: str) -> InputError:
         """Return the error about a member that a run would not have written."""
         return InputError(
-            f"'{self._path}' is damaged: {self._group.name.rstrip('/')}/{name} {what}; restore it, "
-            "or run again"
+            f"'{self._path}' is damaged: {self._group.name.rstrip('/')}/{name} {defect}; restore "
+            "it, or run again"
         )
 
     def __contains__(self, name: str) -> bool:
@@ -94,8 +97,10 @@ class StoredFile(StoredGroup):
     def __init__(self, path: Path) -> None:
         import h5py  # late: no step needs it
 
-        with open_to_read(path) as own:  # a regular file; HDF5 opens it once more by its name
-            status = os.fstat(own.fileno())
+        # A regular file is opened first; HDF5 opens it once more, by its name, and must meet the
+        # same one.
+        with open_to_read(path) as raw:
+            status = os.fstat(raw.fileno())
             self._file = h5py.File(path, "r")
             status_of_hdf5 = os.fstat(self._file.id.get_vfd_handle())
             if not os.path.samestat(status, status_of_hdf5):

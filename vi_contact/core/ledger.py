@@ -1,4 +1,10 @@
-"""Close the energy ledger of a step: where the energy went, and what the ledger cannot explain."""
+"""Close the energy ledger of a step: where the energy went, and what the ledger cannot explain.
+
+Every scheme satisfies an equation of motion with averages of its own (``core.step.Balance``).
+Multiplied by the displacement increment du of the step, each term is the work of one cause; the
+sum of these works is the change of energy, whatever the scheme, unless the step was not solved.
+``energy_balance`` does it, and the recorder ``Energy`` adds the steps up.
+"""
 
 from dataclasses import dataclass
 
@@ -64,7 +70,7 @@ class Energies:
         return self.kinetic + self.strain
 
 
-def energies(system: SemiDiscreteSystem, u: Array, v: Array) -> Energies:
+def compute_energies(system: SemiDiscreteSystem, u: Array, v: Array) -> Energies:
     """Return the energies of a state: two products, unless they are known. Collective.
 
     Args:
@@ -127,48 +133,62 @@ def energy_balance(
     """
     system = problem.equations
     surface = problem.surface
-    before = before or energies(system, old.u, old.v)
-    after = after or energies(system, new.u, new.v)
+    before = before or compute_energies(system, old.u, old.v)
+    after = after or compute_energies(system, new.u, new.v)
     du = new.u - old.u
 
-    # What this rank has of each work, and of the difference of the scheme's averages from the mean
-    # of both ends; one reduction adds all of it up over the ranks.
-    push, drag = _obstacle_work(problem, old.t, new.t, balance)
-    rub = 0.0
+    # Works of this rank that are not there in every problem: of an obstacle that moves, of friction
+    # and of damping.
+    pushing, dragging = _compute_obstacle_work(problem, old.t, new.t, balance)
+    rubbing = 0.0
     if balance.r_t is not None:
-        rub = float(np.sum(balance.r_t * surface.tangential_values(du)))
-    damp = 0.0
+        rubbing = float(np.sum(balance.r_t * surface.tangential_values(du)))
+    damping = 0.0
     if system.C is not None:
-        damp = float(du.dot(system.product("C", balance.v)))
-    load, inertia, kinetic, stiffness, press, rub, push, drag, damp = _dot_pairs(
+        damping = float(du.dot(system.product("C", balance.v)))
+
+    # One reduction adds them up over the ranks, and five inner products with them: the work of
+    # loads, that of M a, the change of kinetic energy, the work of K (u - ½(u0 + u1)) on du (K is
+    # symmetric: K du is known), and the work of normal reactions.
+    works = _dot_pairs(
         system,
         (du, balance.f),
         (du, system.product("M", balance.a)),
         (0.5 * (old.v + new.v), after.momentum - before.momentum),
         (balance.u - 0.5 * (old.u + new.u), after.elastic - before.elastic),
         (balance.r_n, surface.normal_values(du)),
-        sums=(rub, push, drag, damp),
+        sums=(rubbing, pushing, dragging, damping),
     )
+    loading, inertia, kinetic, stiffness, pressing, rubbing, pushing, dragging, damping = works
+
+    # The support takes what reactions do on the motion relative to it. What they do on its own
+    # motion is input.
     return StepEnergy(
         change=after.total - before.total,
-        input=load + push + drag,
-        damping=damp,
-        contact=press + push,
-        friction=rub + drag,
+        input=loading + pushing + dragging,
+        damping=damping,
+        contact=pressing + pushing,
+        friction=rubbing + dragging,
         algorithmic=inertia - kinetic + stiffness,
     )
 
 
-def _obstacle_work(
+def _compute_obstacle_work(
     problem: ContactProblem, start: float, end: float, balance: Balance
 ) -> tuple[float, float]:
     """Return the work [J] of a moving obstacle on this rank: r_n·advance and -r_t·sliding.
+
+    The obstacle presses the body with -r_n along the direction towards itself, and comes the other
+    way by ``advance``; it drags the body with -r_t along its own ``sliding``.
 
     Args:
         problem: the problem that is marched.
         start: time of the beginning of the step [s].
         end: time of its end [s].
-        balance: the equation of motion, with the reactions.
+        balance: the equation of motion, with the reactions [N].
+
+    Returns:
+        The works in normal and in tangential direction, zero for an obstacle at rest.
     """
     advance = problem.surface.advance(start, end)
     sliding = problem.surface.sliding(start, end)

@@ -18,12 +18,20 @@ GOLDEN = 0.6180339887498949
 
 
 def probe(numbers: Any, j: int) -> Array:
-    """Return values between -1/2 and 1/2 at these whole numbers; each j gives others."""
+    """Return values between -1/2 and 1/2 at these whole numbers; each j gives others.
+
+    Multiples of the golden ratio, without their whole part, never repeat: products with them meet
+    every entry of a matrix, and are the same on any number of ranks.
+
+    Args:
+        numbers: (n,) those of the owned unknowns.
+        j: 0, 1, … for different vectors.
+    """
     turns = np.asarray(numbers, dtype=float) * (GOLDEN / (j + 1))
     return np.asarray(turns % 1.0 - 0.5)
 
 
-def asymmetry(A: Matrix, comm: Comm, numbers: Indices) -> float:
+def measure_asymmetry(A: Matrix, comm: Comm, numbers: Indices) -> float:
     """Return max |A w - Aᵀ w| / max |A w|, NaN or infinity where A has them. Collective.
 
     Args:
@@ -44,7 +52,9 @@ def asymmetry(A: Matrix, comm: Comm, numbers: Indices) -> float:
         return float(np.float64(error) / scale) if scale else error
 
 
-def matrix_defects(owner: str, comm: Comm, numbers: Indices, **matrices: Matrix) -> Iterator[str]:
+def find_matrix_defects(
+    owner: str, comm: Comm, numbers: Indices, **matrices: Matrix
+) -> Iterator[str]:
     """Yield a sentence for each matrix that is not finite, and for each defect of M.
 
     M must be symmetric and have no masses below zero. Collective: take all sentences on every rank.
@@ -56,7 +66,7 @@ def matrix_defects(owner: str, comm: Comm, numbers: Indices, **matrices: Matrix)
         matrices: the matrices by their names, M among them.
     """
     for name, A in matrices.items():
-        defect = asymmetry(A, comm, numbers)
+        defect = measure_asymmetry(A, comm, numbers)
         if not np.isfinite(defect):
             yield f"{owner}: {name} has NaN or infinite entries; give finite numbers"
         elif defect > SYMMETRIC and name == "M":
@@ -64,6 +74,8 @@ def matrix_defects(owner: str, comm: Comm, numbers: Indices, **matrices: Matrix)
                 f"{owner}: M is not symmetric, M w and Mᵀ w differ by {defect:.1g} of their size; "
                 "give a symmetric one"
             )
+
+    # No mass is negative, and one of zero stands alone in its row: M has no entry beside it.
     M = matrices["M"]
     masses = M.diagonal()
     if largest(comm, -np.min(masses, initial=0.0)) > 0.0:

@@ -24,12 +24,19 @@ class OldPaths(MetaPathFinder, Loader):
     """Find modules by their old paths, and give the modules themselves, not copies."""
 
     def __init__(self) -> None:
-        self._specs: dict[str, ModuleSpec | None] = {}  # own specs, while an import goes on
+        # Specs of modules at their new paths, by the old path, while an import goes on.
+        self._specs: dict[str, ModuleSpec | None] = {}
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None = None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """Return where to find a module by its old path; None for any other path."""
+        """Return where to find a module by its old path; None for any other path.
+
+        Args:
+            fullname: dotted path that is imported.
+            path: where to look for submodules; not read, as the new path says it.
+            target: a module that is loaded anew; not read.
+        """
         return None if _new_path(fullname) is None else ModuleSpec(fullname, self)
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:

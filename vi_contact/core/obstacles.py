@@ -7,7 +7,7 @@ from typing import Annotated, Protocol
 import numpy as np
 
 from .algebra import Array, Indices, Mask
-from .checks import array, function, place_in_words
+from .checks import array, describe_point, function
 from .errors import InputError
 from .quantities import Unit
 
@@ -169,7 +169,7 @@ def locate_obstacle(
     directions = array(owner, "what directions returns", answer, points.shape)
     length = np.linalg.norm(directions, axis=1)
     if not length.all():
-        place = place_in_words(points[np.argmin(length)])
+        place = describe_point(points[np.argmin(length)])
         raise InputError(f"{owner}: the contact direction at {place} has no length; {REMEDY}")
     _refuse_beside(owner, name, directions / length[:, None], normals)
     gap = np.asarray(obstacle.gap(points, normals))
@@ -194,7 +194,7 @@ def locate_obstacle(
     wrong = np.flatnonzero(away & ~(beyond & _turn_smoothly(cosines, angle)))
     if len(wrong):
         turn = np.degrees(np.arccos(np.clip(cosines[wrong], -1.0, 1.0)).mean())
-        place = place_in_words(points[wrong[0]])
+        place = describe_point(points[wrong[0]])
         raise InputError(
             f"{owner}: the contact direction at {place}{_of_boundary(name)} points into the "
             f"body at {turn:.4g} degrees to the outward normal, in the mean of {len(wrong)} "
@@ -215,17 +215,20 @@ def _refuse_beside(owner: str, name: str, directions: Array, normals: Array) -> 
     cosines = np.sum(directions * normals, axis=1)
     if not len(cosines) or cosines.max() > BESIDE:
         return
+
+    # The sentence is about the part that the obstacle can reach, or about all of it where that is
+    # none.
     reached = cosines >= -RIGHT_ANGLE
     if not np.any(reached):
         reached = np.ones(len(cosines), dtype=bool)
     direction = _normalise(directions[reached].mean(axis=0))
     normal = _normalise(normals[reached].mean(axis=0))
     angle = np.degrees(np.arccos(np.clip(direction @ normal, -1.0, 1.0)))
-    what = "points into the body" if cosines.max() < -BESIDE else "is along the boundary"
+    defect = "points into the body" if cosines.max() < -BESIDE else "is along the boundary"
     raise InputError(
-        f"{owner}: the contact direction {place_in_words(direction.round(6))}{_of_boundary(name)} "
-        f"{what} at {angle:.4g} degrees to its mean outward normal "
-        f"{place_in_words(normal.round(6))}; choose the boundary that looks towards the obstacle, "
+        f"{owner}: the contact direction {describe_point(direction.round(6))}{_of_boundary(name)} "
+        f"{defect} at {angle:.4g} degrees to its mean outward normal "
+        f"{describe_point(normal.round(6))}; choose the boundary that looks towards the obstacle, "
         f"or {REMEDY}"
     )
 
@@ -255,7 +258,7 @@ def _normalise(vector: Array) -> Array:
     return np.asarray(vector / length + 0.0)
 
 
-def admissible_gap(gap: Array, points: Array, size: float) -> Array:
+def check_gap(gap: Array, points: Array, size: float) -> Array:
     """Return the initial gap (m,) [m] without round-off below zero.
 
     Args:
@@ -272,7 +275,7 @@ def admissible_gap(gap: Array, points: Array, size: float) -> Array:
         )
     if len(gap) and gap.min() < -OVERLAP * size:
         worst = int(np.argmin(gap))
-        place = place_in_words(points[worst])
+        place = describe_point(points[worst])
         raise InputError(
             f"the body penetrates its obstacle by {-gap[worst]:.3g} m at {place} "
             "before the first step: move the obstacle or the mesh so that every initial gap is >= 0"

@@ -97,7 +97,7 @@ def open_to_append(path: Path, *, make: bool = False) -> Any:
     if make:
         flags |= os.O_CREAT
     file = _wrap_unbuffered(_open_descriptor(path, flags), path, "ab+")
-    if names(file) > 1:
+    if count_names(file) > 1:
         file.close()
         _replace_by_copy(path)
         file = _wrap_unbuffered(_open_descriptor(path, flags), path, "ab+")
@@ -113,7 +113,7 @@ def open_lock(path: Path) -> Any:
     return _wrap_unbuffered(_open_descriptor(path, os.O_RDWR | os.O_CREAT), path, "rb+")
 
 
-def names(file: Any) -> int:
+def count_names(file: Any) -> int:
     """Return how many names an open file has: more with hard links, 0 when it was removed."""
     return os.fstat(file.fileno()).st_nlink
 
@@ -201,13 +201,13 @@ def _open_descriptor(path: Path, flags: int) -> int:
 
 def _replace_by_copy(path: Path) -> None:
     """Put a copy of a file in its place."""
-    copy = temporary_of(path)
+    copy = name_temporary(path)
     with open_to_read(path) as old, open_new(copy) as new:
         shutil.copyfileobj(old, new)
     os.replace(copy, path)
 
 
-def temporary_of(path: Path) -> Path:
+def name_temporary(path: Path) -> Path:
     """Return the name under which this process makes a file that is to replace another."""
     return path.with_name(f".{path.name}.{os.getpid()}.tmp")
 

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from .algebra import Array
-from .checks import array, instance, optional, provides, refuse, shown
+from .checks import array, instance, optional, provides, quote, refuse
 from .collective import Parts, agree
 from .corners import refuse_rubbing
 from .errors import InputError
 from .protocols import EXCITATION, Excitation, FrictionLaw, Frictionless, ImpactLaw, MassLaw
 from .surfaces import ContactSurface
-from .system import Load, SemiDiscreteSystem, history_value
+from .system import Load, SemiDiscreteSystem, evaluate_history
 from .timing import report_time
 
 
@@ -48,7 +48,7 @@ class ContactProblem:
         if isinstance(self.surface, ContactSurface):
             agree(self.surface.comm, "ContactProblem", laws | {"excitation": self.excitation})
         check_parts(self)
-        object.__setattr__(self, "friction", with_values(self.friction, self.surface, self._own))
+        object.__setattr__(self, "friction", replace_tuples(self.friction, self.surface, self._own))
 
     def _own(self, values: tuple[Any, ...]) -> tuple[Any, ...]:
         """Return those of this rank, of values for the contact points of all ranks."""
@@ -62,11 +62,11 @@ class ContactProblem:
             f"ContactProblem with {self.surface.total} contact conditions",
             str(self.system),
             str(self.surface),
-            f"friction: {shown(self.friction)}",
-            f"impact: {shown(self.impact)}",
-            f"mass: {shown(self.mass or 'that of the time scheme')}",
+            f"friction: {quote(self.friction)}",
+            f"impact: {quote(self.impact)}",
+            f"mass: {quote(self.mass or 'that of the time scheme')}",
         ]
-        lines += [f"excitation: {shown(excitation)}" for excitation in self.excitations]
+        lines += [f"excitation: {quote(excitation)}" for excitation in self.excitations]
         return "\n  ".join(lines)
 
     @cached_property
@@ -92,6 +92,8 @@ class ContactProblem:
         These are -M r a_g(t), of every excitation.
         """
         system = self.unshaken
+
+        # One separable load for each excitation: a vector, times its history.
         terms = []
         for excitation in self.excitations:
             direction = np.asarray(excitation.direction, dtype=float)
@@ -132,7 +134,9 @@ class ContactProblem:
         dual = self.surface.dual
         if basis is None:
             return system
-        known: dict[Any, tuple[Load, SemiDiscreteSystem]] = system.cached("turned", dict)
+
+        # The system keeps the last turned one, and the load that was turned with it.
+        known: dict[Any, tuple[Load, SemiDiscreteSystem]] = system.make_once("turned", dict)
         if (basis, dual) not in known:
             known.clear()  # it takes as much memory as the system
             known[basis, dual] = (system.load, system.in_basis(basis, dual))
@@ -174,13 +178,13 @@ class ContactProblem:
         # Lists of two or three numbers take less time than arrays.
         total = [0.0] * self.system.influence.shape[1]
         for excitation in self.excitations:
-            a = float(history_value(excitation.acceleration, t))
+            a = float(evaluate_history(excitation.acceleration, t))
             for i, component in enumerate(excitation.direction):
                 total[i] += a * component
         return np.array(total)
 
 
-def with_values(
+def replace_tuples(
     law: Any, surface: ContactSurface, change: Callable[[tuple[Any, ...]], tuple[Any, ...]]
 ) -> Any:
     """Return a law with other tuples on several ranks, and so the laws that it is made of.
@@ -195,7 +199,7 @@ def with_values(
     changes: dict[str, Any] = {}
     for name in [part.name for part in fields(law) if part.init]:
         old = getattr(law, name)
-        new = change(old) if isinstance(old, tuple) else with_values(old, surface, change)
+        new = change(old) if isinstance(old, tuple) else replace_tuples(old, surface, change)
         if new is not old:
             changes[name] = new
     return replace(law, **changes) if changes else law
@@ -225,6 +229,8 @@ def check_parts(problem: Any) -> None:
         provides(owner, "mass", problem.mass, ("apply",), remedy, lacks=("target",))
     for excitation in excitations:
         _check_excitation(excitation, system)
+
+    # Parts that are right by themselves and do not fit each other.
     if system.absolute and excitations:
         raise InputError(
             "a compliant base is shaken by its own upgoing motion: leave out the excitation of the "
@@ -240,6 +246,8 @@ def check_parts(problem: Any) -> None:
             f"ContactProblem: the surface is shared by {surface.comm.size} ranks and the system by "
             f"{system.algebra.comm.size}: make both on the same ranks"
         )
+
+    # What may be wrong on one rank alone: all ranks are asked before any of them raises.
     total = surface.total  # collective
     defects = (*_find_defects_of_system(system), *_find_defects_of_surface(surface, system, total))
     refuse(defects, surface.comm)
@@ -253,7 +261,7 @@ def _refuse_repeated(excitations: Sequence[Any]) -> None:
     for first, second in combinations(excitations, 2):
         if first is second:
             raise InputError(
-                f"ContactProblem: excitation names {shown(first)} twice, which would shake twice: "
+                f"ContactProblem: excitation names {quote(first)} twice, which would shake twice: "
                 "leave it out once, or scale it"
             )
 
@@ -273,6 +281,7 @@ def _check_excitation(excitation: Any, system: SemiDiscreteSystem) -> None:
 
 def _find_defects_of_system(system: SemiDiscreteSystem) -> Iterator[str]:
     """Yield a sentence for each wrong size or value of a system on this rank."""
+    # All vectors have an entry for each unknown of this rank, n, and all matrices a row.
     n = system.rows
     d = system.influence.shape[1]
     for name in ("M", "K", "C"):
@@ -332,6 +341,8 @@ def _find_defects_of_surface(
     }
     shapes |= dict.fromkeys(("gap0", "weights", "bilateral", "compliance", "owned", "slots"), (m,))
     yield from _find_other_shapes("the contact surface", surface, shapes)
+
+    # Numbers of unknowns and of conditions must be there; a tangent of -1 is prescribed.
     for name, least, end in (("owned", 0, n), ("tangents", -1, n), ("slots", 0, total)):
         values = getattr(surface, name)
         if np.size(values) and not (least <= np.min(values) and np.max(values) < end):

@@ -33,7 +33,11 @@ class Remembered:
         self._known: dict[Any, tuple[Any, Array | Callable[[], Array]]] = {}
 
     def __call__(self, x: Any) -> Array:
-        """Return the value at x."""
+        """Return the value at x, a vector or a float.
+
+        It is remembered for numbers and for vectors that nobody can write to: of others the
+        identity says nothing of the content.
+        """
         is_number = type(x) is float
         known = self._known.get(x if is_number else id(x))
         if known is not None:
@@ -45,7 +49,13 @@ class Remembered:
         return value
 
     def _remember(self, key: Any, x: Any, value: Array | Callable[[], Array]) -> None:
-        """Add a value, and forget the oldest one where there are too many."""
+        """Add a value, and forget the oldest one where there are too many.
+
+        Args:
+            key: the number x, or the id of the vector x.
+            x: the number or vector, which is kept alive.
+            value: the value at x, or what makes it.
+        """
         if len(self._known) == self._size:
             oldest = next(iter(self._known))
             del self._known[oldest]

@@ -109,7 +109,13 @@ class Frictionless:
     never_negative: ClassVar[bool] = True
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
-        """Return zeros, shape (m,); the arguments are those of ``FrictionLaw``."""
+        """Return zeros (m,): no reaction, however large the pressure.
+
+        Args:
+            r_n: normal reactions (m,), ``scale`` times newtons; only their number is read.
+            weights: areas (m,) [m²]; not read.
+            scale: how many times newtons the reactions of the step are; not read.
+        """
         return np.zeros_like(r_n, dtype=float)
 
     def slope(self, weights: Array) -> Array:

@@ -152,7 +152,7 @@ class Quantity:
         """Return the symbol of its unit; "" where it has none, or is a ratio."""
         return "" if self.unit in (None, RATIO) else self.unit.symbol
 
-    def named(self, name: str) -> str:
+    def describe(self, name: str) -> str:
         """Return the words for it in a sentence, its meaning with the unit, or its name.
 
         The unit of an argument without a meaning stands in the remedy.
@@ -170,7 +170,7 @@ class Quantity:
 
 
 @cache
-def quantities(owner: Callable[..., Any]) -> Mapping[str, Quantity]:
+def read_quantities(owner: Callable[..., Any]) -> Mapping[str, Quantity]:
     """Return what the annotations of a dataclass or function say, by argument.
 
     A field that a class declares anew without marks, for another default, keeps those of the class
@@ -179,7 +179,7 @@ def quantities(owner: Callable[..., Any]) -> Mapping[str, Quantity]:
     """
     inherited: Mapping[str, Quantity] = {}
     if isinstance(owner, type) and owner is not object:
-        inherited = quantities(owner.__mro__[1])
+        inherited = read_quantities(owner.__mro__[1])
     try:
         marked = get_type_hints(owner, include_extras=True)
         bare = get_type_hints(owner)

@@ -24,7 +24,7 @@ def refuse_dense(owner: str, rows: int, *, instead: str = "Iterative(), which st
         )
 
 
-def small(comm: Comm, unknowns: int, conditions: int, *, worth: int = 1) -> bool:
+def is_small_problem(comm: Comm, unknowns: int, conditions: int, *, worth: int = 1) -> bool:
     """Say whether a problem that the package solves beside the steps is small. Collective.
 
     Small ones are condensed with a factor of their own, whatever solves the steps; larger ones are

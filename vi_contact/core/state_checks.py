@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from .algebra import max_abs
-from .checks import instance, number, refuse, shown, whole
+from .checks import instance, number, quote, refuse, whole
 from .errors import InputError
 from .problem import ContactProblem
 from .step import State
@@ -20,7 +20,7 @@ def check_problem_given(owner: str, value: Any) -> None:
     instance(owner, "problem", value, ContactProblem, "give a ContactProblem(system, surface, …)")
 
 
-def start_time(owner: str, state: Any) -> float:
+def read_start_time(owner: str, state: Any) -> float:
     """Return the time of a state [s], 0 for None; InputError for anything else."""
     if state is None:
         return 0.0
@@ -39,14 +39,17 @@ def check_sizes(owner: str, problem: ContactProblem, state: Any) -> None:
         problem: the problem.
         state: the state, which may be anything on any rank.
     """
-    start_time(owner, state)
+    read_start_time(owner, state)
     instance(owner, "state", state, State, "give a state, of static_equilibrium or of a run")
     defects = _find_defects_of_state(problem, state)
     refuse((f"{owner}: {text}" for text in defects), problem.surface.comm)
 
 
 def _find_defects_of_state(problem: ContactProblem, state: State) -> Iterator[str]:
-    """Yield a sentence for each wrong array of a state on this rank."""
+    """Yield a sentence for each wrong array of a state on this rank.
+
+    Its memory is not looked at: that is for its scheme.
+    """
     n = problem.system.rows
     m = problem.surface.count
     d = problem.system.influence.shape[1]
@@ -70,7 +73,7 @@ def _find_defects_of_state(problem: ContactProblem, state: State) -> Iterator[st
         kinds = "b" if name == "active" else "iuf"
         if value.dtype.kind not in kinds or not np.all(np.isfinite(value)):
             wanted = "True or False" if name == "active" else "finite real numbers"
-            yield f"{name} of the state is {shown(value)}: give {wanted}"
+            yield f"{name} of the state is {quote(value)}: give {wanted}"
 
 
 def initial_state(problem: ContactProblem, t: float = 0.0) -> State:
@@ -85,6 +88,8 @@ def initial_state(problem: ContactProblem, t: float = 0.0) -> State:
     """
     system = problem.equations
     surface = problem.surface
+    # Only rigid supports bound u0: springs may be pressed. Round-off is relative to the largest
+    # displacement and gap of all ranks.
     gap = np.where(surface.rigid, surface.gap(t) - surface.normal_values(system.u0), np.inf)
     overlap = np.max(-gap, initial=-np.inf)
     gap0 = np.max(surface.gap0, initial=0.0)

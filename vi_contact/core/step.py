@@ -7,10 +7,15 @@ Every time scheme turns a step into the same one-step problem, and every solver 
 
 (bilateral rows: equality and r_n of either sign). A is constant as long as dt is, so it is
 factorised once. ``r_n`` and ``r_t`` are ``scale`` times the reactions of the step in newtons, those
-of the body on its support; ``compliance`` is zero on a rigid support. Vectors are arrays of the
-unknowns that this rank owns, in the rotated basis; contact arrays have shape (m,) or, tangential
-ones, (m, d - 1), a row for each condition on these unknowns; r_t is None without friction. Branch
-on them with ``surface.some``, which asks all ranks: what follows may be collective.
+of the body on its support; ``compliance`` is zero on a rigid support. The scale is the scheme's: 1
+for reactions at the end of the step, 2 for means of the midpoint rule, whose equation is multiplied
+by two so that K has the factor one in A, and dt for impulses in N s.
+
+Vectors are arrays of the unknowns that this rank owns, in the rotated basis: there B_n and B_t
+select entries, as the normal and the tangential displacements of a contact node are unknowns
+themselves. Contact arrays have shape (m,) or, tangential ones, (m, d - 1), a row for each condition
+on these unknowns; r_t is None without friction. Branch on them with ``surface.some``, which asks
+all ranks: what follows may be collective.
 
 The loop (``run.march``) calls, for every step, in this order:
 
@@ -32,7 +37,7 @@ import numpy as np
 
 from .algebra import Array, EffectiveMatrix, Mask
 from .certificate import Certificate
-from .checks import on_all, place_in_words, shown
+from .checks import describe_point, on_all, quote
 from .errors import InputError, ViContactError
 from .problem import ContactProblem
 from .protocols import FrictionLaw, Frictionless, MassLaw
@@ -52,7 +57,7 @@ class State:
             says.
         active: (m,) True for closed conditions.
         memory: what a scheme carries besides u and v: vectors (n,), and arrays that are the same on
-            every rank.
+            every rank. The class of the scheme says under which names; nobody else reads it.
         r_t: tangential reactions (m, d - 1) [N] of that step, None without friction.
     """
 
@@ -102,6 +107,9 @@ class StepProblem:
             in static problems, where friction is that of rest.
         lower: (m,) bounds from below too, which ``Volume`` alone knows (``vi``); None in the steps
             of a scheme.
+
+    Of several runs at once (``by_rows`` of ``Scheme``), b, guess and active have a row for each,
+    (k, n) and (k, m); what the runs share is as above.
     """
 
     A: EffectiveMatrix
@@ -140,7 +148,7 @@ class StepProblem:
         Raises:
             InputError: limits that are negative or no numbers.
         """
-        speed = self.rate_factor * np.linalg.norm(slip, axis=1)
+        speed = self.rate_factor * np.linalg.norm(slip, axis=1)  # [m/s]
 
         def ask_law() -> FrictionLaw:
             law = self.friction.at(speed)
@@ -167,15 +175,18 @@ def refuse_limits(law: FrictionLaw, surface: ContactSurface, scale: float, t: fl
         return
     owner = type(law).__name__
     weights = surface.weights
+
+    # The limit is linear in r_n >= 0, so its value at zero and its slope say all of it.
     parts = {
         "slope": law.slope(weights),
         "limit(0)": law.limit(np.zeros(surface.count), weights, scale),
     }
     for name, part in parts.items():
+        # A law of the user's own may return anything: look at type and shape before the signs.
         values = np.asarray(part)
         if values.dtype.kind not in "iuf" or values.shape != (surface.count,):
             raise InputError(
-                f"{owner}: {name} is {shown(part)} at t = {t:g} s; return "
+                f"{owner}: {name} is {quote(part)} at t = {t:g} s; return "
                 f"{surface.count} real numbers, one for each contact condition"
             )
         wrong = np.flatnonzero(~((values >= 0.0) & (values < np.inf)))
@@ -183,7 +194,7 @@ def refuse_limits(law: FrictionLaw, surface: ContactSurface, scale: float, t: fl
             first = wrong[0]
             raise InputError(
                 f"{owner}: {name} is {values[first]:g} at "
-                f"{place_in_words(surface.points[first])} and t = {t:g} s; a friction limit is "
+                f"{describe_point(surface.points[first])} and t = {t:g} s; a friction limit is "
                 "zero or a positive finite number"
             )
 
@@ -203,6 +214,8 @@ class StepResult:
         history: how the method converged, in a measure of its own.
         aim: the residual at which an iterative method stopped because it was told to, 0 for one
             that goes on to round-off.
+
+    Of several runs at once, x, r_n, active and r_t have a row for each.
     """
 
     x: Array
@@ -217,13 +230,13 @@ class StepResult:
 
 @dataclass(frozen=True)
 class Answers:
-    """Answer a step of several runs.
+    """Answer a step of several runs: ``solve_many`` of a prepared solver returns it.
 
     Attributes:
         rows: x (k, n), r_n and active (k, m) and r_t (k, m, d - 1), a row for each of the k runs.
         iterations: those of each run.
         failed: what a run without an answer raises, by its row.
-        histories: with friction, that of each run.
+        histories: with friction, that of each run (``StepResult.history``).
     """
 
     rows: StepResult
@@ -232,7 +245,7 @@ class Answers:
     histories: Sequence[tuple[float, ...]] = ()
 
     def own(self, row: int) -> StepResult:
-        """Return the answer of one run."""
+        """Return the answer of the run with this row, from 0 to k - 1."""
         rows = self.rows
         return StepResult(
             x=rows.x[row],
@@ -252,8 +265,16 @@ class Balance:
         M a + C v + K u = f - B_nᵀ r_n - B_tᵀ r_t
 
     Multiplying it by the displacement increment gives the energy ledger of any scheme
-    (``core.ledger.energy_balance``). u [m], v [m/s], a [m/s²] and f [N] are (n,), r_n (m,) and r_t
-    (m, d - 1) [N].
+    (``core.ledger.energy_balance``). At theta = ½, for instance, u is ½ (u0 + u1) and a is (v1 -
+    v0)/dt.
+
+    Attributes:
+        u: averaged displacement (n,) [m].
+        v: averaged velocity (n,) [m/s].
+        a: averaged acceleration (n,) [m/s²].
+        f: averaged load (n,) [N].
+        r_n: averaged normal reactions (m,) [N].
+        r_t: averaged tangential reactions (m, d - 1) [N]; None without friction.
     """
 
     u: Array
@@ -472,6 +493,8 @@ class Recorder(Protocol):
         """
 
 
+# What recorders return, in the words of their annotations: name -> (unit, meaning), and
+# name -> number or array.
 Columns = Mapping[str, tuple[str, str]]
 Row = Mapping[str, Any]
-AXES = "xyz"
+AXES = "xyz"  # how the names of columns end that have a direction

@@ -6,6 +6,10 @@ a selection of entries. Contact arrays (bounds, reactions, active sets, slips) h
 every condition of this rank, and none of another's: what is asked of all of them (``some``,
 ``everywhere``) is asked on all ranks. Sign: the direction n points from the body to the obstacle,
 u_n = u·n, gap = gap0 - u_n >= 0, reaction r_n >= 0.
+
+``ContactSurface`` is a value: its methods read it, or return another surface (``moving``,
+``on_springs``, …). Below it stand the frames that T is made of: ``make_nodal_frames`` gives every
+contact node a normal and tangents, ``arrange_frames`` says in which columns of T these stand.
 """
 
 import logging
@@ -18,9 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .algebra import Array, Comm, Indices, Mask, Matrix, SerialComm, largest, on_first, total
-from .arguments import checked
+from .arguments import check_arguments
 from .census import Census
-from .checks import function, shown
+from .checks import function, quote
 from .collective import call_user
 from .errors import InputError
 from .products import freeze
@@ -58,7 +62,7 @@ class WatchedNodes(Protocol):
     def before_moving(self, towards: Motion | None) -> "WatchedNodes":
         """Return the same nodes before an obstacle that moves towards them, t [s] -> [m]."""
 
-    def carried(self, ground: Callable[[float], Array]) -> "WatchedNodes":
+    def carry(self, ground: Callable[[float], Array]) -> "WatchedNodes":
         """Return the same nodes before an obstacle that the ground carries, t [s] -> (d,) [m]."""
 
 
@@ -156,9 +160,9 @@ class ContactSurface:
         """Return the number of contact conditions of all ranks. Collective when first asked."""
         return round(total(self.comm, self.count))
 
-    def some(self, found: Mask) -> bool:
+    def some(self, mask: Mask) -> bool:
         """Say whether the mask (m,) is True for a condition of any rank. Collective."""
-        return bool(largest(self.comm, np.count_nonzero(found) > 0))
+        return bool(largest(self.comm, np.count_nonzero(mask) > 0))
 
     @cached_property
     def rigid(self) -> Mask:
@@ -180,6 +184,8 @@ class ContactSurface:
         """
         if self.comm.size == 1:
             return np.asarray(values)
+
+        # Each rank has its own rows in a table of zeros, and the sum of the tables has them all.
         whole = np.zeros((self.total, *np.shape(values)[1:]))
         whole[self.slots] = values
         return self.comm.sum(whole).astype(np.asarray(values).dtype)
@@ -201,7 +207,10 @@ class ContactSurface:
         return () if self.nodes is None else group_same_nodes(self.nodes)
 
     def in_frames(self, u: Array) -> Array:
-        """Return T⁻¹ u: displacements (n,) along the axes, turned into the nodal frames."""
+        """Return T⁻¹ u: displacements (n,) along the axes, turned into the nodal frames.
+
+        T⁻¹ is Tᵀ, but where oblique corners have made T not orthogonal (``dual`` = T⁻ᵀ).
+        """
         turn = self.basis if self.dual is None else self.dual
         return u if turn is None else turn.transpose_apply(u)
 
@@ -213,7 +222,8 @@ class ContactSurface:
     def whole(self) -> "ContactSurface":
         """Return a surface with the conditions of all ranks, by number, on every rank. Collective.
 
-        It says where they are and how large; its places in the unknowns stay those of this rank.
+        It says where they are and how large; its places in the unknowns stay those of this rank,
+        so it is no surface to solve with.
         """
         names = ("points", "normals", "weights", "gap0", "bilateral", "compliance", "nodes")
         known = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
@@ -221,7 +231,11 @@ class ContactSurface:
         return replace(self, comm=SerialComm(), slots=np.arange(self.total), **arrays)
 
     def normal_values(self, x: Array) -> Array:
-        """Return B_n x (m,); of rows (k, n) rows (k, m), as in all these products with B."""
+        """Return B_n x (m,); of rows (k, n) rows (k, m), as in all these products with B.
+
+        Args:
+            x: displacement, velocity or acceleration of the owned unknowns (n,), or rows (k, n).
+        """
         return np.asarray(x[self.owned] if x.ndim == 1 else x.take(self.owned, -1))
 
     def tangential_values(self, x: Array) -> Array:
@@ -232,6 +246,10 @@ class ContactSurface:
         """Return the tangential displacements relative to the obstacle (m, d - 1) [m].
 
         Open points have one too.
+
+        Args:
+            u: displacement (n,) [m].
+            t: time [s], for an obstacle that slides.
         """
         displacement = self.tangential_values(u)
         return displacement if self.slide is None else displacement - self.slide(t)
@@ -256,8 +274,10 @@ class ContactSurface:
         Args:
             r_n: normal reactions (m,) [N], or rows (k, m).
             rows: number of unknowns that this rank owns.
-            r_t: tangential reactions (m, d - 1) [N], None without friction.
+            r_t: tangential reactions (m, d - 1) [N], or rows (k, m, d - 1), None without friction.
         """
+        # Entries are set and not added, as an unknown belongs to one condition. The transposed
+        # views let one statement serve a vector and rows of vectors.
         load = np.zeros((*r_n.shape[:-1], rows))
         load.T[self.owned] = r_n.T
         if r_t is not None:
@@ -305,11 +325,12 @@ class ContactSurface:
                 [m]: one number, or an array (m, d-1). None: not at all.
         """
         watched = tuple(nodes.before_moving(towards) for nodes in self.watched)
-        motion = slide = None
+        motion = None
+        slide = None
         if towards is not None:
-            motion = _motion_of_points("towards", towards, self.gap0.shape)
+            motion = _spread_over_points("towards", towards, self.gap0.shape)
         if along is not None:
-            slide = _motion_of_points("along", along, self.tangents.shape)
+            slide = _spread_over_points("along", along, self.tangents.shape)
         return replace(self, watched=watched, motion=motion, slide=slide)
 
     def bilateral_everywhere(self) -> "ContactSurface":
@@ -331,24 +352,29 @@ class ContactSurface:
             )
         return replace(self, frictionless_corners=True)
 
-    @checked
+    @check_arguments
     def on_springs(
         self, stiffness: Annotated[float, Positive, Unit("Pa/m"), "the foundation modulus"]
     ) -> "ContactSurface":
         """Return the surface on a linearly deformable support, with this foundation modulus.
 
-        Each point presses a fictitious spring k = stiffness * weight, whose far end obeys the
-        unilateral law.
+        Each point presses a fictitious spring k = stiffness * weight [N/m], whose far end obeys the
+        unilateral law: r_n = k (u_n - gap0) where that is positive, else zero.
+
+        Args:
+            stiffness: pressure over indentation [Pa/m], above zero.
         """
         return replace(self, compliance=1.0 / (float(stiffness) * self.weights))
 
 
-def _motion_of_points(name: str, given: Motion, shape: tuple[int, ...]) -> Callable[[float], Array]:
+def _spread_over_points(
+    name: str, given: Motion, shape: tuple[int, ...]
+) -> Callable[[float], Array]:
     """Return a user's motion of an obstacle as a function that gives every point its own [m].
 
     Args:
         name: the argument that it was given as.
-        given: the user's function of the time.
+        given: the user's function of the time t [s].
         shape: that of the values, a row for each condition.
     """
     function("moving", name, given, "give a function of the time t [s] that returns metres")
@@ -356,13 +382,13 @@ def _motion_of_points(name: str, given: Motion, shape: tuple[int, ...]) -> Calla
 
     def motion(t: float) -> Array:
         owner = f"a moving obstacle: {name}({t:g} s)"
-        return call_user(owner, lambda: _spread_motion(owner, given(t), shape), nowhere)
+        return call_user(owner, lambda: _spread_value(owner, given(t), shape), nowhere)
 
     motion.given = given  # type: ignore[attr-defined]  # is asked for its frequency
     return motion
 
 
-def _spread_motion(owner: str, value: Any, shape: tuple[int, ...]) -> Array:
+def _spread_value(owner: str, value: Any, shape: tuple[int, ...]) -> Array:
     """Return what a user's motion gives as an array with a row for each condition.
 
     Args:
@@ -379,7 +405,7 @@ def _spread_motion(owner: str, value: Any, shape: tuple[int, ...]) -> Array:
     fits = metres.ndim <= len(shape) and all(n in (1, m) for n, m in pairs)
     if not fits or metres.dtype.kind not in "iuf" or not np.all(np.isfinite(metres)):
         raise InputError(
-            f"{owner} is {shown(value)}; return finite metres, one number or an array of shape "
+            f"{owner} is {quote(value)}; return finite metres, one number or an array of shape "
             f"{shape}"
         )
     return np.broadcast_to(metres.astype(float), shape)
@@ -388,8 +414,10 @@ def _spread_motion(owner: str, value: Any, shape: tuple[int, ...]) -> Array:
 def group_same_nodes(nodes: Indices) -> tuple[Indices, ...]:
     """Return, for each number that stands several times in ``nodes`` (m,), its places.
 
-    The groups are in the order of the numbers.
+    The groups are in the order of the numbers, and the places of a group ascend.
     """
+    # Equal numbers are side by side in the sorted array, as many as ``counts`` says, from ``first``
+    # on.
     order = np.argsort(nodes, kind="stable")
     _, first, counts = np.unique(nodes[order], return_index=True, return_counts=True)
     several = counts > 1
@@ -398,12 +426,13 @@ def group_same_nodes(nodes: Indices) -> tuple[Indices, ...]:
     return tuple(order[start : start + k] for start, k in zip(starts, sizes, strict=True))
 
 
-def nodal_frames(directions: Array) -> Array:
+def make_nodal_frames(directions: Array) -> Array:
     """Return orthonormal frames (k, d, d) of contact directions (k, d).
 
     The first column is the contact direction n, the others are tangential. In the plane t = (-n_y,
     n_x). In space t1 is the projection of the axis that is least aligned with n, and t2 = n x t1.
     """
+    # All nodes at once: frames[i, :, c] is vector c of the frame of node i.
     k, d = directions.shape
     frames = np.empty((k, d, d))
     frames[:, :, 0] = directions
@@ -418,14 +447,14 @@ def nodal_frames(directions: Array) -> Array:
     return frames
 
 
-def nodal_blocks(frames: Array) -> tuple[Indices, Array]:
+def arrange_frames(frames: Array) -> tuple[Indices, Array]:
     """Return (c, Q): nodal frames whose contact direction is in the column of its own component.
 
     Axes at right angles to a direction keep their own columns: they are the components that may be
     prescribed.
 
     Args:
-        frames: (k, d, d) as ``nodal_frames`` returns them.
+        frames: (k, d, d) as ``make_nodal_frames`` returns them.
 
     Returns:
         c (k,), the largest component of each direction, and Q (k, d, d), whose column c is the
@@ -451,8 +480,14 @@ def nodal_blocks(frames: Array) -> tuple[Indices, Array]:
     return normal, blocks
 
 
-def tangential_columns(column: Indices, d: int) -> Indices:
-    """Return the columns (m, d-1) of a frame beside the normal ones (m,), ascending."""
+def list_tangential_columns(column: Indices, d: int) -> Indices:
+    """Return the columns (m, d-1) of a frame beside the normal ones (m,), ascending.
+
+    Args:
+        column: (m,) in which column the contact direction of a condition stands.
+        d: dimension, number of columns.
+    """
+    # 0, 1, … d - 2, where those from the normal column on move up by one.
     tangents = np.arange(d - 1)[None, :]
     return np.asarray(tangents + (tangents >= column[:, None]))
 

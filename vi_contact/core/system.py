@@ -1,4 +1,15 @@
-"""Hold the semi-discrete equations of motion M u'' + C u' + K u = f(t), and their loads."""
+"""Hold the semi-discrete equations of motion M u'' + C u' + K u = f(t), and their loads.
+
+A system goes through these hands: ``fem.assemble`` (or a user with matrices) makes it along the
+axes; ``ContactProblem`` turns it into the nodal frames of the contact surface (``in_basis``), lets
+the mass law change M, takes contact points relative to a deformable other side (``in_relative``)
+and adds the inertia loads of excitations; schemes read what comes out as ``problem.equations``.
+Each of these makes another system, as none ever changes.
+
+Three things are remembered in a system, as they are asked for again and again: products with M, C
+and K (``product``), the load at the last times (``load_at``), and whatever is made of the matrices
+once (``make_once``), such as factors.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -7,7 +18,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from .algebra import Algebra, Array, EffectiveMatrix, Mask, Matrix
-from .checks import array, function, instance, provides, several, shown
+from .checks import array, function, instance, provides, quote, several
 from .collective import keep_error
 from .errors import InputError
 from .products import Remembered
@@ -79,7 +90,7 @@ class Space(Protocol):
         """
 
 
-OTHERS = 4  # surfaces and other objects, for each of which factors are remembered
+OTHERS = 4  # surfaces and other objects, at most, for each of which factors are remembered
 # Products with each that are remembered: what a step and the next one may ask for again.
 PRODUCTS = {"M": 6, "C": 4, "K": 2, "load": 2}
 PAIR_REMEDY = "give pairs of a vector [N] and a function of the time"
@@ -124,7 +135,7 @@ class Load:
                 function("Load", f"a part of {name}", part, "give a function of the time [s]")
 
     def __call__(self, t: float) -> Array:
-        """Return f(t) [N]."""
+        """Return f(t) (n,) [N] at time t [s]."""
         total = self.at_rest(t)
         for parts in (self.viscous, self.inertial):
             for moving in parts:
@@ -132,13 +143,14 @@ class Load:
         return total
 
     def at_rest(self, t: float) -> Array:
-        """Return the load [N] of a static stage at time t [s].
+        """Return the load (n,) [N] of a static stage at time t [s].
 
-        What moves in a given way stands still where it is at that time.
+        What moves in a given way stands still where it is at that time: its viscous and inertial
+        shares are left out.
         """
         total = self.constant.copy()
         for vector, history in self.separable:
-            total += history_value(history, t) * vector
+            total += evaluate_history(history, t) * vector
         for part in self.general:
             total += part(t)
         return total
@@ -153,15 +165,20 @@ class Load:
             inertial=_turn(T, self.inertial),
         )
 
-    def handed_over(self, P: Matrix) -> "Load":
-        """Return the load that belongs to C* = PᵀCP, with Pᵀ on its viscous parts."""
+    def transform_viscous(self, P: Matrix) -> "Load":
+        """Return the load that belongs to C* = PᵀCP, with Pᵀ on its viscous parts.
+
+        A mass law that takes the inertia of contact nodes to their neighbours takes their damping
+        there too.
+        """
         return replace(self, viscous=_turn(P, self.viscous))
 
 
-def history_value(history: Callable[[float], float], t: float) -> float:
+def evaluate_history(history: Callable[[float], float], t: float) -> float:
     """Return the value of a history at time t [s].
 
-    NaN and infinity pass here: they are refused in the load as a whole.
+    NaN and infinity pass here: they are refused in the load as a whole. The usual float goes
+    through first, as this is called for every history in every step.
 
     Raises:
         InputError: the function raises, or returns anything but one real number; in a frame of
@@ -174,7 +191,7 @@ def history_value(history: Callable[[float], float], t: float) -> float:
     if isinstance(value, float):
         return value
     if np.ndim(value) or np.asarray(value).dtype.kind not in "iuf":
-        what = f"the history of a load or excitation is {shown(value)} at t = {t:g} s"
+        what = f"the history of a load or excitation is {quote(value)} at t = {t:g} s"
         return keep_error(what, InputError(f"{what}: return one real number"), 0.0)
     return value
 
@@ -258,7 +275,7 @@ class SemiDiscreteSystem:
             is_array = isinstance(value, np.ndarray) and value.ndim == axes
             if not is_array or value.dtype.kind not in "iuf":
                 raise InputError(
-                    f"{owner}: {name} is {shown(value)}; give real numbers along {axes} axes"
+                    f"{owner}: {name} is {quote(value)}; give real numbers along {axes} axes"
                 )
 
     def __repr__(self) -> str:
@@ -281,7 +298,7 @@ class SemiDiscreteSystem:
         """Return ½ uᵀ K u [J]."""
         return 0.5 * self.algebra.dot(u, self.K @ u)
 
-    def cached(self, name: str, make: Callable[[], Any], *others: Any) -> Any:
+    def make_once(self, name: str, make: Callable[[], Any], *others: Any) -> Any:
         """Return what ``make`` returned the first time: a factor, or the like.
 
         It lives as long as the system. What depends on the load does not belong here: systems that
@@ -291,7 +308,10 @@ class SemiDiscreteSystem:
             name: what it is called here.
             make: makes it.
             others: the objects beside M, C and K that it depends on, as the contact surface. Each
-                of the last few has its own.
+                of the last few has its own, and they are told apart by identity.
+
+        Returns:
+            What ``make`` has returned, now or before.
         """
         known: dict[tuple[int, ...], tuple[Any, Any]] = self._cache.setdefault(name, {})
         key = tuple(map(id, others))
@@ -311,6 +331,10 @@ class SemiDiscreteSystem:
         """Return M x, C x or K x (n,), or rows (k, n) of rows; read-only.
 
         The last products with read-only vectors are remembered (``core.products``).
+
+        Args:
+            name: "M", "C" or "K".
+            x: displacement, velocity or acceleration (n,), or rows (k, n).
         """
         return (self._products.get(name) or self._open_memory(name))(x)
 
@@ -327,7 +351,9 @@ class SemiDiscreteSystem:
         Args:
             many: the system that the runs share.
             row: the row of this run.
-            known: (name, x, rows) for each product that is known, and ("load", t, t).
+            known: (name, x, rows) for each product that is known: the vector x (n,) of this run
+                stands in the row of ``rows`` (k, n), whose product the shared system knows. For the
+                load ("load", t, t).
         """
 
         def take_row(name: str, rows: Any) -> Callable[[], Array]:
@@ -353,7 +379,8 @@ class SemiDiscreteSystem:
     def rates(self, u0: Array, u1: Array, v0: Array, v1: Array, dt: float) -> tuple[Array, Array]:
         """Return (u1 - u0)/dt [m/s] and (v1 - v0)/dt [m/s²].
 
-        The products of C and M with them are then known: differences of those with both ends.
+        The products of C and M with them are then known: differences of those with both ends. So
+        the energy ledger, which asks for them, costs no product.
 
         Args:
             u0: displacement (n,) [m] before the step.
@@ -362,17 +389,28 @@ class SemiDiscreteSystem:
             v1: velocity (n,) [m/s] after it.
             dt: size of the step [s].
         """
-
-        def divide(name: str, x0: Array, x1: Array) -> Array:
-            product = self._open_memory(name)
-            return product.know((x1 - x0) / dt, lambda: (product(x1) - product(x0)) / dt)
-
-        velocity = (u1 - u0) / dt if self.C is None else divide("C", u0, u1)
-        acceleration = divide("M", v0, v1)
+        velocity = (u1 - u0) / dt if self.C is None else self._compute_rate("C", u0, u1, dt)
+        acceleration = self._compute_rate("M", v0, v1, dt)
         return velocity, acceleration
 
+    def _compute_rate(self, name: str, x0: Array, x1: Array, dt: float) -> Array:
+        """Return (x1 - x0)/dt, whose product with a matrix is then known.
+
+        Args:
+            name: "M", "C" or "K".
+            x0: (n,), or rows (k, n), before the step.
+            x1: (n,), or rows (k, n), after it.
+            dt: size of the step [s].
+        """
+        product = self._open_memory(name)
+        return product.know((x1 - x0) / dt, lambda: (product(x1) - product(x0)) / dt)
+
     def changed(self, **values: Any) -> "SemiDiscreteSystem":
-        """Return the same system with other values of some attributes, and with no factor yet."""
+        """Return the same system with other values of some attributes, and with no factor yet.
+
+        Args:
+            values: attribute -> its new value.
+        """
         return replace(self, **values)
 
     def effective(self, *, m: float, c: float, k: float, shares: bool = False) -> EffectiveMatrix:
@@ -381,9 +419,9 @@ class SemiDiscreteSystem:
         Its factor is made when it is first needed.
 
         Args:
-            m: factor of the mass.
-            c: factor of the damping.
-            k: factor of the stiffness.
+            m: factor of the mass, [1/s²] where x is a displacement.
+            c: factor of the damping, [1/s] there.
+            k: factor of the stiffness, 1 there.
             shares: whether the scheme needs M x, C x and K x in its next step, so that A x may be
                 made of them.
         """
@@ -391,6 +429,8 @@ class SemiDiscreteSystem:
         if self.C is not None:
             terms.append((c, self.C))
 
+        # A x, which the certificate asks for, out of products that the scheme finds in the memory
+        # when it steps on from x.
         def image(x: Array) -> Array:
             total = m * self.product("M", x)
             total += self.product("K", x) if k == 1.0 else k * self.product("K", x)
@@ -407,11 +447,16 @@ class SemiDiscreteSystem:
         )
 
     def with_load(self, *terms: tuple[Array, Callable[[float], float]]) -> "SemiDiscreteSystem":
-        """Return the same system with separable loads vector * history(t) added."""
+        """Return the same system with separable loads vector * history(t) added.
+
+        Args:
+            terms: pairs of a vector (n,) [N] and a function of the time t [s].
+        """
         return self.changed(load=replace(self.load, separable=self.load.separable + terms))
 
     def loaded(self, load: Load) -> "SemiDiscreteSystem":
         """Return the same system under another load in its basis, with the factors of this one."""
+        # The dataclass is frozen, and what is made of the matrices is shared: hence this way.
         other = self.changed(load=load)
         object.__setattr__(other, "_cache", self._cache)
         return other

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from .algebra import Comm
 from .certificate import Certificate
-from .collective import limit_of
+from .collective import ask_limit
 from .step import StepProblem, StepResult
 
 # How far rounding may show in A x, relative to the largest entry of A times that of x; and how
-# much smaller than the displacements of a step a slip may be that friction is judged by.
+# much smaller than the displacements of a step a slip may be that friction is judged by
+# (``Certificate`` has the reasons).
 ROUNDING = 1e-5
 FEW = 5_000  # numbers in an array, up to which copies cost less than calls
 
@@ -36,8 +37,8 @@ def kkt_residual(step: StepProblem, result: StepResult) -> Certificate:
         The certificate, whose residuals are pure numbers. What is no number makes a residual
         infinite or NaN, so that it can never pass.
     """
-    (sizes,) = _sizes(step, result)
-    return _certificate(step, result, sizes)
+    (sizes,) = _measure_sizes(step, result)
+    return _make_certificate(step, result, sizes)
 
 
 def kkt_residuals(
@@ -54,9 +55,10 @@ def kkt_residuals(
         The certificate of each row, equal to that of ``kkt_residual``.
     """
     certificates = []
-    for row, sizes in enumerate(_sizes(many, result)):
+    for row, sizes in enumerate(_measure_sizes(many, result)):
+        # Without friction the sizes say all; a law of friction is asked for each run by itself.
         step, answer = (many, result) if many.slip0 is None else own(row)
-        certificates.append(_certificate(step, answer, sizes))
+        certificates.append(_make_certificate(step, answer, sizes))
     return certificates
 
 
@@ -78,8 +80,11 @@ class _Sizes(NamedTuple):
     r_n: Any
 
 
-def _sizes(step: StepProblem, result: StepResult) -> list[_Sizes]:
-    """Return the largest sizes of a step over all ranks; of several steps, an entry for each."""
+def _measure_sizes(step: StepProblem, result: StepResult) -> list[_Sizes]:
+    """Return the largest sizes of a step over all ranks; of several steps, an entry for each.
+
+    The conditions are put in as they stand at the head of ``core.step``. Collective: one reduction.
+    """
     surface = step.surface
 
     # Equilibrium: what is left of A x - b when the contact forces are added to it.
@@ -116,42 +121,58 @@ def _sizes(step: StepProblem, result: StepResult) -> list[_Sizes]:
         guess=step.guess,
         r_n=result.r_n,
     )
-    largest = _largest(surface.comm, arrays)
+    largest = _find_largest(surface.comm, arrays)
     return [_Sizes(*sizes) for sizes in (largest if result.x.ndim == 2 else [largest])]
 
 
-def _certificate(step: StepProblem, result: StepResult, sizes: _Sizes) -> Certificate:
-    """Return the certificate: each size over the one that it is compared with."""
+def _make_certificate(step: StepProblem, result: StepResult, sizes: _Sizes) -> Certificate:
+    """Return the certificate: each size over the one that it is compared with. Collective.
+
+    Args:
+        step: the problem.
+        result: its answer.
+        sizes: the largest sizes over all ranks.
+    """
+    # x_ref and r_ref of ``Certificate``: the largest displacement (or velocity), and the largest
+    # force, in the units of x and of b.
     length = max(sizes.x, sizes.guess)
     force = max(sizes.load, sizes.r_n)
     rounding = ROUNDING * step.A.largest * sizes.x
-    cone, dissipation = _friction(step, result, length, force)
+    cone, dissipation = _judge_friction(step, result, length, force)
     return Certificate(
-        equilibrium=_over(sizes.unbalanced, max(sizes.load, sizes.image, rounding)),
-        penetration=_over(sizes.overlap, length),
-        tension=_over(sizes.tension, force),
+        equilibrium=_divide(sizes.unbalanced, max(sizes.load, sizes.image, rounding)),
+        penetration=_divide(sizes.overlap, length),
+        tension=_divide(sizes.tension, force),
         complementarity=float(
-            np.maximum(_over(sizes.apart, length), _over(sizes.loose, force))  # keeps NaN
+            np.maximum(_divide(sizes.apart, length), _divide(sizes.loose, force))  # keeps NaN
         ),
         cone=cone,
         dissipation=dissipation,
     )
 
 
-def _friction(
+def _judge_friction(
     step: StepProblem, result: StepResult, length: float, force: float
 ) -> tuple[float, float]:
-    """Return (cone, dissipation) of ``Certificate``; zero without friction.
+    """Return (cone, dissipation) of ``Certificate``; zero without friction. Collective.
 
     cone: how far |r_t| exceeds its limit. dissipation: how far r_t misses the work limit |slip| of
     a point that slips, because of its size or its direction.
+
+    Args:
+        step: the problem.
+        result: its answer.
+        length: the largest displacement (or velocity) of the step.
+        force: the largest load or reaction of the step.
     """
     if step.slip0 is None:
         return 0.0, 0.0
     surface = step.surface
     r_t = np.zeros_like(step.slip0) if result.r_t is None else result.r_t
+
+    # The law at the slip rates of the answer, with the limit of its normal reactions.
     slip = surface.tangential_values(result.x) - step.slip0
-    limit = limit_of(step.friction_at(slip), result.r_n, surface.weights, step.scale)
+    limit = ask_limit(step.friction_at(slip), result.r_n, surface.weights, step.scale)
     r_t_size = np.linalg.norm(r_t, axis=1)
     slip_size = np.linalg.norm(slip, axis=1)
 
@@ -160,25 +181,32 @@ def _friction(
     missing = limit * slip_size - np.sum(r_t * slip, axis=1)
 
     # A step slides a small part of the way, and rubs with a small part of the inertia.
-    beyond_most, missing_most, limit_most, r_t_most, slip_most = _largest(
+    beyond_most, missing_most, limit_most, r_t_most, slip_most = _find_largest(
         surface.comm, (beyond, missing, limit, r_t_size, slip_size)
     )
     tangential_force = max(limit_most, r_t_most, ROUNDING**2 * force)
     way = max(slip_most, ROUNDING * length)
-    return _over(beyond_most, tangential_force), _over(missing_most, tangential_force * way)
+    return _divide(beyond_most, tangential_force), _divide(missing_most, tangential_force * way)
 
 
-def _largest(comm: Comm, arrays: Sequence[NDArray[Any]]) -> list[Any]:
+def _find_largest(comm: Comm, arrays: Sequence[NDArray[Any]]) -> list[Any]:
     """Return max |a| along the last axis of each array, over all ranks by one reduction.
 
     Infinity stands for NaN, which no reduction keeps. Of arrays with a row for each of several
     steps it is a list for each step.
+
+    Args:
+        comm: the ranks that share the arrays.
+        arrays: of any lengths, all of them (…) or all of them (k, …).
+
+    Returns:
+        A number for each array, or a list of such lists, one for each of the k steps.
     """
     lengths = tuple([array.shape[-1] for array in arrays])
     if arrays[0].size <= FEW and 0 not in lengths:
         # Small steps cost what calls of numpy cost: one for all arrays, side by side.
         joined = np.abs(np.concatenate(arrays, axis=-1))
-        sizes = np.maximum.reduceat(joined, _starts(lengths), axis=-1)
+        sizes = np.maximum.reduceat(joined, _find_starts(lengths), axis=-1)
     else:
         # Large ones cost the memory that is read and written: no copy.
         highest = [array.max(axis=-1, initial=0.0) for array in arrays]
@@ -189,15 +217,16 @@ def _largest(comm: Comm, arrays: Sequence[NDArray[Any]]) -> list[Any]:
 
 
 @cache
-def _starts(lengths: tuple[int, ...]) -> list[int]:
+def _find_starts(lengths: tuple[int, ...]) -> list[int]:
     """Return where arrays of these lengths begin when they lie side by side."""
     return list(accumulate(lengths[:-1], initial=0))
 
 
-def _over(value: float, reference: float) -> float:
+def _divide(value: float, reference: float) -> float:
     """Return value / reference, with 0 / 0 = 0: where nothing happens, nothing is wrong.
 
-    It is NaN for infinity over infinity.
+    It is infinite where the reference alone is zero, and NaN for infinity over infinity: neither
+    passes a tolerance.
     """
     if value == 0.0 and reference < np.inf:
         return 0.0

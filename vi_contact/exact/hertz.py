@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.algebra import Array
-from ..core.arguments import check_fields, checked
+from ..core.arguments import check_arguments, check_fields
 from ..core.errors import InputError
 from ..core.quantities import Positive, Unit
 
@@ -75,7 +75,7 @@ class HertzPoint:
         check_fields(self)
 
     @classmethod
-    @checked
+    @check_arguments
     def from_approach(
         cls,
         approach: Annotated[float, Positive, Unit("m")],

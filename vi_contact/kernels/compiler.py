@@ -3,10 +3,16 @@
 They are kept in the user's cache, as DOLFINx keeps forms: $XDG_CACHE_HOME or ~/.cache, folder
 vi_contact.
 
-The loops (``LOOPS``) need a C compiler only. ``factor.c`` needs CHOLMOD too, and takes none but the
-one that PETSc has brought into the process: another one beside it would share names with it, and
-with the METIS and the BLAS of PETSc, so that functions of one call those of the other. Compiling
-against the header beside that CHOLMOD makes any version do.
+There are two libraries:
+
+- the loops (``LOOPS``), which need a C compiler only: ``load_loops``;
+- ``factor.c``, which needs CHOLMOD too: ``load_cholmod``. It takes no CHOLMOD but the one that
+  PETSc has brought into the process. Another one beside it would share names with it, and with the
+  METIS and the BLAS of PETSc, so that functions of one call those of the other. Compiling against
+  the header beside that CHOLMOD makes any version do.
+
+Neither has to be there: each ``load_…`` returns None where its library cannot be made, the log says
+why, and numpy or PETSc does the work. All ranks get a library, or none of them does.
 """
 
 import ctypes
@@ -42,7 +48,7 @@ def load_loops(comm: Comm) -> Any:
 
     The first rank compiles them. Collective.
     """
-    return _alike(comm, _loops)
+    return _load_alike(comm, _load_own_loops)
 
 
 def load_cholmod(comm: Comm) -> Any:
@@ -51,66 +57,79 @@ def load_cholmod(comm: Comm) -> Any:
     It is None where PETSc has no CHOLMOD or nothing can be compiled, and the same on all ranks. The
     first rank compiles it. Collective.
     """
-    return _alike(comm, _factoriser)
+    return _load_alike(comm, _load_factoriser)
 
 
-def _alike(comm: Comm, found: Callable[[], Any]) -> Any:
+def _load_alike(comm: Comm, load: Callable[[], Any]) -> Any:
+    """Return what ``load`` returns, or None on all ranks where it does so on one. Collective.
+
+    Args:
+        comm: the ranks that load it.
+        load: loads a library, and compiles it where it is not in the cache; None where it cannot.
+    """
+    # The first rank compiles while the others wait; they find its file in the cache.
     if comm.rank == 0:
-        found()
+        load()
     comm.bcast(None)
-    here = found()
-    return None if largest(comm, here is None) else here
+    library = load()
+    return None if largest(comm, library is None) else library
 
 
 @lru_cache(maxsize=1)
-def _loops() -> Any:
+def _load_own_loops() -> Any:
     """Return the functions, or None where there is no compiler or cache.
 
     Without one, a line in the log says so once.
     """
     try:
-        found = ctypes.CDLL(str(compile_library(LOOPS, [])))
+        library = ctypes.CDLL(str(compile_library(LOOPS, [])))
     except (OSError, RuntimeError, subprocess.SubprocessError) as problem:
         # RuntimeError: nobody's home is known
         log.info(
             "numpy does what compiled loops would do faster, because they need a C compiler: %s",
-            _said(problem),
+            _take_first_line(problem),
         )
         return None
-    found.relax.restype = ctypes.c_double
-    return found
+    library.relax.restype = ctypes.c_double  # ctypes takes int where nothing is said
+    return library
 
 
-def _factoriser() -> Any:
+def _load_factoriser() -> Any:
     """Return the functions for the CHOLMOD of this process.
 
     A PETSc may bring it later than we are asked first.
     """
     try:
-        return _with_cholmod(cholmod_of_petsc())
+        return _compile_with_cholmod(locate_cholmod_of_petsc())
     except OSError as problem:
-        return _without_cholmod(str(problem))
+        return _report_no_cholmod(str(problem))
 
 
 @lru_cache(maxsize=1)
-def _with_cholmod(file: Path) -> Any:
-    loops = _loops()
+def _compile_with_cholmod(file: Path) -> Any:
+    """Return the functions for a CHOLMOD, or None where they cannot be had.
+
+    Args:
+        file: the library of CHOLMOD, which is in this process already.
+    """
+    loops = _load_own_loops()
     if loops is None:
-        return _without_cholmod("there is no C compiler that works")
+        return _report_no_cholmod("there is no C compiler that works")
     try:
-        made = compile_library([FACTOR], [f"-I{_header(file)}"], file)
-        found = ctypes.CDLL(str(made))
-        if not found.header_fits():
-            raise OSError(f"the header in {_header(file)} is of another version than {file}")
+        headers = _locate_header_folder(file)
+        library = ctypes.CDLL(str(compile_library([FACTOR], [f"-I{headers}"], file)))
+        if not library.header_fits():
+            raise OSError(f"the header in {headers} is of another version than {file}")
     except (OSError, RuntimeError, subprocess.SubprocessError) as problem:
-        return _without_cholmod(_said(problem))
-    found.columns.restype = ctypes.c_long
+        return _report_no_cholmod(_take_first_line(problem))
+    library.columns.restype = ctypes.c_long
     functions = {name: getattr(loops, name) for name in OF_LOOPS}
-    return SimpleNamespace(**functions, **{name: getattr(found, name) for name in OF_CHOLMOD})
+    functions |= {name: getattr(library, name) for name in OF_CHOLMOD}
+    return SimpleNamespace(**functions)
 
 
 @lru_cache(maxsize=1)
-def _without_cholmod(reason: str) -> None:
+def _report_no_cholmod(reason: str) -> None:
     """Say once in the log why."""
     log.info(
         "PETSc factorises, because the quicker way needs a C compiler and PETSc's CHOLMOD: %s",
@@ -118,7 +137,7 @@ def _without_cholmod(reason: str) -> None:
     )
 
 
-def cholmod_of_petsc() -> Path:
+def locate_cholmod_of_petsc() -> Path:
     """Return the file of the CHOLMOD that PETSc has brought into this process.
 
     Raises:
@@ -128,25 +147,32 @@ def cholmod_of_petsc() -> Path:
         raise OSError("no PETSc is in this process")
     if not packages.petsc_has("cholmod"):
         raise OSError("this PETSc was built without CHOLMOD")
-    return _loaded_cholmod(MAPS)
+    return _locate_cholmod(MAPS)
 
 
 @lru_cache(maxsize=1)
-def _loaded_cholmod(maps: Path) -> Path:
+def _locate_cholmod(maps: Path) -> Path:
     """Return the file of the one CHOLMOD in this process.
 
-    A library stays once it is there, and to read this list takes longer than small steps. OSError,
-    which is asked anew, unless there is exactly one.
+    The answer is remembered: a library stays once it is there, and to read this list takes longer
+    than small steps. An error is not, so that the list is read again.
+
+    Args:
+        maps: the list of the memory of this process, which Linux keeps as a text.
+
+    Raises:
+        OSError: there is none, or more than one.
     """
+    # A line has five columns (addresses, rights and the like), and then the file.
     lines = maps.read_text(encoding="utf-8", errors="surrogateescape").splitlines()
     files = {line.split(maxsplit=5)[5] for line in lines if "libcholmod" in line}
-    found = sorted(file for file in files if Path(file).name.startswith("libcholmod"))
-    if len(found) != 1:
-        raise OSError(f"there are {len(found)} files of CHOLMOD in this process {found}")
-    return Path(found[0])
+    libraries = sorted(file for file in files if Path(file).name.startswith("libcholmod"))
+    if len(libraries) != 1:
+        raise OSError(f"there are {len(libraries)} files of CHOLMOD in this process {libraries}")
+    return Path(libraries[0])
 
 
-def _header(file: Path) -> Path:
+def _locate_header_folder(file: Path) -> Path:
     """Return the folder of the header that was installed with this library.
 
     The library lies in lib, or lib/x86_64-linux-gnu, beside include.
@@ -179,25 +205,27 @@ def compile_library(sources: Sequence[Path], options: Sequence[str], *libraries:
     # The name of the file says all that it was made of.
     headers = sorted(sources[0].parent.glob("*.h"))
     texts = [file.read_text(encoding="utf-8") for file in (*sources, *headers)]
-    stamps = [(str(one), one.stat().st_size, one.stat().st_mtime_ns) for one in libraries]
+    stamps = [(str(file), file.stat().st_size, file.stat().st_mtime_ns) for file in libraries]
     made_of = f"{texts}{command}{stamps}{platform.machine()}"
     key = sha256(made_of.encode()).hexdigest()[:16]
     folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "vi_contact"
     file = folder / f"{sources[0].stem}-{key}.so"
 
+    # A file that is there may still be damaged, or of a C library that is older here: to load it is
+    # the test. Otherwise compile beside it, and put the result in its place in one move.
     try:
         ctypes.CDLL(str(file))
     except OSError:
         folder.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(dir=folder) as aside:
-            made = Path(aside) / file.name
-            command += [*map(str, sources), "-o", str(made), *map(str, libraries), "-lm"]
+            compiled = Path(aside) / file.name
+            command += [*map(str, sources), "-o", str(compiled), *map(str, libraries), "-lm"]
             subprocess.run(command, check=True, capture_output=True, text=True)
-            made.replace(file)
+            compiled.replace(file)
     return file
 
 
-def addresses(*arrays: NDArray[Any] | None) -> list[ctypes.c_void_p | None]:
+def locate_arrays(*arrays: NDArray[Any] | None) -> list[ctypes.c_void_p | None]:
     """Return where arrays lie in memory; None for None.
 
     Whoever asks holds the arrays for as long as a compiled function uses their addresses.
@@ -209,8 +237,8 @@ def addresses(*arrays: NDArray[Any] | None) -> list[ctypes.c_void_p | None]:
     ]
 
 
-def _said(problem: Exception) -> str:
+def _take_first_line(problem: Exception) -> str:
     """Return the first line of what a compiler or the system said."""
-    return (
-        (getattr(problem, "stderr", None) or str(problem)).strip().splitlines() or [repr(problem)]
-    )[0]
+    message = getattr(problem, "stderr", None) or str(problem)
+    lines = message.strip().splitlines()
+    return lines[0] if lines else repr(problem)

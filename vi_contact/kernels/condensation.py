@@ -1,6 +1,9 @@
 """Condense A onto contact unknowns c: their flexibility, free motion, and the answer to reactions.
 
-    G = (A⁻¹)_cc,    free: (A⁻¹b)_c,    answer: x = A⁻¹(b - r) with reactions r on c
+    G = (A⁻¹)_cc,    free motion: (A⁻¹b)_c,    answer: x = A⁻¹(b - r) with reactions r on c
+
+A step asks twice: ``find_free_motion(b)`` before its reactions are known, and ``answer(r, …)`` when
+a solver has found them in  x_c = (A⁻¹b)_c - G r.
 
 With the contact unknowns last in the factor (``contact_last``) a step costs one forward and one
 backward substitution, and G comes from the corner of the factor. Where there is no such factor it
@@ -33,58 +36,72 @@ def condense(
     # Contact unknowns of this rank, a row for each condition, and of all ranks by global numbers;
     # -1 stands for one that cannot move.
     first = A.algebra.first(A.matrix.rows)
-    own = surface.owned[:, None]
+    rows = surface.owned[:, None]
     if frictional:
-        own = np.hstack([own, surface.tangents])
-    unknowns = surface.everywhere(np.where(own >= 0, own + first, -1)).ravel()
-    moves = unknowns >= 0
-    last = unknowns[moves]
+        rows = np.hstack([rows, surface.tangents])
+    unknowns = surface.everywhere(np.where(rows >= 0, rows + first, -1)).ravel()
+    movable = unknowns >= 0
+    last = unknowns[movable]
 
     # An unknown of two conditions cannot be last twice.
     are_different = len(np.unique(last)) == len(last)
     factor = A.contact_last(last) if are_different else None
     if factor is not None:
-        return CondensedLast(factor, moves)
-    width = own.shape[1]
+        return CondensedLast(factor, movable)
+
+    # Otherwise solve for each of them. Those of condition j stand at j width, j width + 1, … among
+    # all.
+    width = rows.shape[1]
     places = surface.slots[:, None] * width + np.arange(width)
-    return CondensedTwice(A, surface, own[own >= 0], places[own >= 0], moves)
+    return CondensedTwice(A, surface, rows[rows >= 0], places[rows >= 0], movable)
 
 
 class CondensedLast:
     """Hold A condensed onto k contact unknowns, which come last in its factor.
 
-    ``free`` begins a step, and ``answer`` ends it. Their arguments may also be those of several
-    steps, a row for each.
+    ``find_free_motion`` begins a step, and ``answer`` ends it. Their arguments may also be those of
+    several steps, a row for each.
 
     Attributes:
         flexibility: (k, k) G.
-        there: (k,) which unknowns can move.
+        movable: (k,) which unknowns can move.
     """
 
-    def __init__(self, factor: ContactLast, there: Mask) -> None:
-        """Invert the corner of the factor; ``there`` (k,) says which unknowns can move."""
-        self._factor = factor
-        self.there = there
-        self._all = bool(there.all())
-        corner = factor.corner
-        inverse = lapack.dpotri(corner, lower=1)[0] if len(corner) else corner
-        self.flexibility: Array = np.zeros((len(there), len(there)))
-        self.flexibility[np.ix_(there, there)] = np.tril(inverse) + np.tril(inverse, -1).T
+    def __init__(self, factor: ContactLast, movable: Mask) -> None:
+        """Invert the corner of the factor.
 
-    def free(self, b: Array) -> Array:
-        """Return x_c (k,) of A⁻¹b, and keep b for ``answer``. Collective."""
+        Args:
+            factor: a factor of A with the movable contact unknowns last.
+            movable: (k,) which contact unknowns can move; the others are not in the factor.
+        """
+        self._factor = factor
+        self.movable = movable
+        self._all = bool(movable.all())
+        corner = factor.corner
+
+        # G is the inverse of A condensed onto c, and that is (L_cc L_ccᵀ)⁻¹. LAPACK gives its lower
+        # triangle.
+        inverse = lapack.dpotri(corner, lower=1)[0] if len(corner) else corner
+        self.flexibility: Array = np.zeros((len(movable), len(movable)))
+        self.flexibility[np.ix_(movable, movable)] = np.tril(inverse) + np.tril(inverse, -1).T
+
+    def find_free_motion(self, b: Array) -> Array:
+        """Return x_c (k,) of A⁻¹b, and keep b for ``answer``. Collective.
+
+        It takes the forward substitution of b, and a small one with the corner.
+        """
         self._y = self._factor.forward(b)
-        x = self._factor.free(self._y)
+        x = self._factor.solve_corner(self._y)
         if self._all:
             self._x = x
         else:
-            self._x = np.zeros((*b.shape[:-1], len(self.there)))
-            self._x.T[self.there] = x.T
+            self._x = np.zeros((*b.shape[:-1], len(self.movable)))
+            self._x.T[self.movable] = x.T
         return self._x
 
-    def _moving(self, values: NDArray[Any]) -> NDArray[Any]:
+    def _select_movable(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return the values of unknowns that can move."""
-        return values if self._all else values.T[self.there].T
+        return values if self._all else values.T[self.movable].T
 
     def answer(self, r: Array, held: Mask, values: Array) -> Array:
         """Return x = A⁻¹(b - r), owned rows, with some unknowns on given values. Collective.
@@ -92,24 +109,31 @@ class CondensedLast:
         To hold them where they would be but for rounding removes this rounding.
 
         Args:
-            r: (k,) reactions.
-            held: (k,) which unknowns are held.
-            values: (k,) on what.
+            r: (k,) reactions, in the unit of b.
+            held: (k,) which contact unknowns are held.
+            values: (k,) the x at which they are held; what stands beside the held ones is not read.
         """
+        # Reactions change y_c alone, as the contact unknowns are the last ones. The backward
+        # substitution then gives the other unknowns that are in equilibrium with x_c.
         if np.count_nonzero(r):
-            x = self._factor.free(self._y - self._factor.reduced(self._moving(r)))
+            x = self._factor.solve_corner(self._y - self._factor.reduce(self._select_movable(r)))
         else:
-            x = self._moving(self._x)
-        return self._factor.backward(np.where(self._moving(held), self._moving(values), x))
+            x = self._select_movable(self._x)
+        x_c = np.where(self._select_movable(held), self._select_movable(values), x)
+        return self._factor.backward(x_c)
 
-    def response(self, r: Array) -> Array:
+    def respond(self, r: Array) -> Array:
         """Return A⁻¹ r, owned rows, of forces r (k,). Collective."""
-        self._factor.unloaded()
-        return self._factor.backward(self._factor.free(self._factor.reduced(r[self.there])))
+        self._factor.forget_load()
+        y_c = self._factor.reduce(r[self.movable])
+        return self._factor.backward(self._factor.solve_corner(y_c))
 
 
 class CondensedTwice:
-    """Hold A condensed onto k contact unknowns, with any factor of A: see ``CondensedLast``."""
+    """Hold A condensed onto k contact unknowns, with any factor of A.
+
+    It has the methods and attributes of ``CondensedLast``, for one step at a time.
+    """
 
     def __init__(
         self,
@@ -117,50 +141,55 @@ class CondensedTwice:
         surface: ContactSurface,
         owned: Indices,
         places: Indices,
-        there: Mask,
+        movable: Mask,
     ) -> None:
         """Solve for a unit force on each contact unknown. Collective.
 
         Args:
             A: the effective matrix.
             surface: the contact surface.
-            owned: the contact unknowns of this rank,
-            places: and where they stand among all.
-            there: (k,) which unknowns can move.
+            owned: the contact unknowns of this rank that can move, as rows of A.
+            places: where these stand among the k contact unknowns of all ranks.
+            movable: (k,) which contact unknowns can move.
         """
         self._A = A
         self._comm = surface.comm
         self._owned = owned
         self._places = places
-        self.there = there
-        G = self._everywhere(A.factor.solve_units(owned, places, len(there), owned))
+        self.movable = movable
+        G = self._gather(A.factor.solve_units(owned, places, len(movable), owned))
         self.flexibility: Array = 0.5 * (G + G.T) if A.algebra.symmetric else G
 
-    def _everywhere(self, values: Array) -> Array:
-        """Return the values at this rank's contact unknowns, for those of all ranks. Collective."""
-        whole = np.zeros((len(self.there), *values.shape[1:]))
+    def _gather(self, values: Array) -> Array:
+        """Return the values at the contact unknowns of all ranks. Collective.
+
+        Each rank gives those at its own, (owned, …). The answer (k, …) is the same on all ranks.
+        """
+        whole = np.zeros((len(self.movable), *values.shape[1:]))
         whole[self._places] = values
         return self._comm.sum(whole)
 
-    def free(self, b: Array) -> Array:
+    def find_free_motion(self, b: Array) -> Array:
         """Return x_c (k,) of A⁻¹b, and keep A⁻¹b for ``answer``. Collective."""
         self._x = self._A.factor.solve(b)
-        return self._everywhere(self._x[self._owned])
+        return self._gather(self._x[self._owned])
 
     def answer(self, r: Array, held: Mask, values: Array) -> Array:
         """Return x = A⁻¹(b - r), owned rows, with some unknowns on given values. Collective.
 
+        The arguments are those of ``CondensedLast.answer``.
+
         Args:
-            r: (k,) reactions.
-            held: (k,) which unknowns are held.
-            values: (k,) on what.
+            r: (k,) reactions, in the unit of b.
+            held: (k,) which contact unknowns are held.
+            values: (k,) the x at which they are held.
         """
-        x = self._x - self.response(r) if r.any() else self._x
+        x = self._x - self.respond(r) if r.any() else self._x
         held_here = held[self._places]
         x[self._owned[held_here]] = values[self._places[held_here]]
         return x
 
-    def response(self, r: Array) -> Array:
+    def respond(self, r: Array) -> Array:
         """Return A⁻¹ r, owned rows, of forces r (k,). Collective."""
         load = np.zeros(self._A.matrix.rows)
         load[self._owned] = r[self._places]

@@ -12,13 +12,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.algebra import Array, Indices, Mask
-from .compiler import addresses
+from .compiler import locate_arrays
 
 NO_SET = 2  # in the first place of a remembered set: none is remembered
 
 
 class Exchanged(NamedTuple):
-    """Hold the answers to k problems of m rows."""
+    """Hold the answers to k problems of m rows.
+
+    Its fields are in the order in which the C function takes the arrays that it fills.
+    """
 
     r: Array  # (k, m)
     active: Mask  # (k, m)
@@ -52,9 +55,12 @@ class Exchanges:
             tolerance: residual, relative to the largest violation by q, that an answer may have.
             most: number of exchanges after which they end.
         """
-        self._loops, self._most = loops, most
-        self._matrix, self._scale, self._bilateral = matrix, scale, bilateral
-        self._limits = c_double(rounding), c_double(tolerance)
+        self._loops = loops
+        self._most = most
+        self._matrix = matrix
+        self._scale = scale
+        self._bilateral = bilateral
+        self._limits = (c_double(rounding), c_double(tolerance))
         self._rows = 0
 
     def solve(self, q: Array, guess: Mask) -> Exchanged:
@@ -62,8 +68,10 @@ class Exchanges:
 
         Args:
             q: (k, m) or (m,), gaps without reactions.
-            guess: (k, m) or (m,), the sets to start from.
+            guess: (k, m) or (m,), the sets to start from, True where r may be above zero.
         """
+        # The C function reads and fills the arrays of this object, whose addresses were noted once:
+        # to look them up takes longer than the exchanges of a small problem.
         k = len(q) if q.ndim == 2 else 1
         if k > self._rows:
             self._make_room(k)
@@ -80,7 +88,10 @@ class Exchanges:
         )
 
     def _make_room(self, k: int) -> None:
-        """Make arrays for k problems, and note their addresses once."""
+        """Make arrays for k problems, and note their addresses once.
+
+        Sets and factors that were remembered are forgotten.
+        """
         m = len(self._bilateral)
         self._rows = k
         self._q = np.empty((k, m))
@@ -98,6 +109,7 @@ class Exchanges:
             np.empty(3 * m),  # room
             np.empty(m, np.int32),  # places of a set
         )
+        # In the order of the parameters of the C function.
         arrays = (
             self._matrix,
             self._scale,
@@ -107,4 +119,4 @@ class Exchanges:
             *self._remembered,
             *self._answers,
         )
-        self._arguments = (m, self._most, *self._limits, *addresses(*arrays))
+        self._arguments = (m, self._most, *self._limits, *locate_arrays(*arrays))

@@ -4,8 +4,9 @@ The problem has m nodes of d unknowns each, r = (r_n, r_t) and w = q + G r: for 
 
     0 <= r_n  ⊥  w_n >= 0 (bilateral: w_n = 0),    |r_t| <= cohesion + slope max(r_n, 0)
 
-and r_t opposes the slip w_t. ``solvers.friction.nsgs`` sweeps the same way in numpy, node by node
-and in double precision.
+and r_t opposes the slip w_t. Here r are reactions [N] (or ``scale`` times newtons), w gaps and
+slips, and G the flexibility between the two. ``solvers.friction.nsgs`` sweeps the same way in
+numpy, node by node and in double precision.
 """
 
 from ctypes import c_double
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.algebra import Array, Mask
-from .compiler import addresses
+from .compiler import locate_arrays
 
 Short = NDArray[np.float32]
 
@@ -55,19 +56,26 @@ class FrictionSweeps:
         """
         self.r = np.array(r, order="C")
         self.w = np.array(w, order="C")
-        self._loops, self._shape = loops, r.shape
+        self._loops = loops
+        self._shape = r.shape
+
+        # Room of the C function: changes that are summed in single precision (m d), and behind them
+        # the states of the nodes now and before (2 m bytes, which are fewer than m numbers).
         room = np.empty(r.size + len(r), dtype=np.float32)
+
         # The arrays are held here, for as long as their addresses are used.
         self._read: list[NDArray[Any] | None] = [G, H, blocks, cohesion, slope, bilateral]
         self._written: list[NDArray[Any]] = [self.r, self.w, room]
 
     def sweep(self, count: int, least: float) -> None:
-        """Make up to this many sweeps over all nodes.
+        """Make up to this many sweeps over all nodes; r and w change in place.
 
         Args:
             count: number of sweeps.
-            least: change of r below which they end; with H they end when no state changes.
+            least: change of r, in its unit, below which they end; with H they end when no node
+                goes from open, stick or slip to another of these.
         """
         m, d = self._shape
-        read, written = addresses(*self._read), addresses(*self._written)
+        read = locate_arrays(*self._read)
+        written = locate_arrays(*self._written)
         self._loops.relax(m, d, *read, count, c_double(least), *written)

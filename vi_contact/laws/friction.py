@@ -21,7 +21,7 @@ import numpy as np
 
 from ..core.algebra import Array
 from ..core.arguments import check_fields
-from ..core.checks import function, shown
+from ..core.checks import function, quote
 from ..core.errors import InputError
 from ..core.quantities import RATIO, Between, Unit
 
@@ -133,7 +133,7 @@ class SlipRateCoulomb:
         values = np.asarray(answer)
         if values.dtype.kind not in "iuf" or values.shape not in ((), speed.shape):
             raise InputError(
-                f"SlipRateCoulomb: mu returns {shown(answer)}, of shape {values.shape} for "
+                f"SlipRateCoulomb: mu returns {quote(answer)}, of shape {values.shape} for "
                 f"{len(speed)} slip rates; return one real coefficient per rate"
             )
         mu = np.broadcast_to(values.astype(float), speed.shape)

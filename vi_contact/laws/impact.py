@@ -31,7 +31,7 @@ from ..core.corners import with_open_faces
 from ..core.free_unknowns import solve_free
 from ..core.protocols import Impact
 from ..core.quantities import RATIO, Between
-from ..core.sizes import small
+from ..core.sizes import is_small_problem
 from ..core.surfaces import ContactSurface
 from ..core.system import SemiDiscreteSystem
 from ..kernels.condensation import condense
@@ -98,9 +98,9 @@ class ImpulseUpdate:
     ) -> Array:
         """Return the velocity after the impulse; the arguments are those of ``VelocityUpdate``."""
         worth = IN_PLANE if surface.points.shape[1] == 2 else 1
-        is_small = system.cached(
+        is_small = system.make_once(
             "small impacts",
-            lambda: small(surface.comm, system.rows, surface.count, worth=worth),
+            lambda: is_small_problem(surface.comm, system.rows, surface.count, worth=worth),
             surface,
         )
         update = _update_condensed if is_small else _update_by_iterations
@@ -142,7 +142,7 @@ def _update_condensed(
     chosen: Indices = np.flatnonzero(~np.isnan(jump))
     if len(chosen) == 0:
         return v
-    flexibility, respond = system.cached(
+    flexibility, respond = system.make_once(
         "impulse update", lambda: _condense_mass(system, surface), surface
     )
     impulse = np.zeros(surface.total)
@@ -167,12 +167,12 @@ def _condense_mass(
     columns = []
     room = STORED * total(comm, system.rows)
     for impulse in np.eye(surface.total):
-        column = condensed.response(impulse)
+        column = condensed.respond(impulse)
         column[np.abs(column) < NEGLIGIBLE * largest(comm, max_abs(column))] = 0.0
         columns.append(sp.csr_matrix(column))
         room -= total(comm, columns[-1].nnz)
         if room < 0:
-            return condensed.flexibility, condensed.response
+            return condensed.flexibility, condensed.respond
     stored = sp.csr_matrix(sp.vstack(columns).T) if columns else sp.csr_matrix((system.rows, 0))
     return condensed.flexibility, lambda impulse: np.asarray(stored @ impulse)
 
@@ -221,7 +221,7 @@ class Inelastic(ByUpdate):
 
 @dataclass(frozen=True)
 class Newton(ByUpdate):
-    """Apply Newton's law v_n⁺ = -e v_n⁻ on points that have just closed.
+    """Apply Newton's law of restitution v_n⁺ = -e v_n⁻ on points that have just closed.
 
     Points that stay closed are left to the step. v_n⁻ is the velocity of approach before the step:
     a single mass rebounds with e times its speed at every dt.

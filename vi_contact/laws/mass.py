@@ -14,7 +14,7 @@ import numpy as np
 
 from ..core.algebra import Array, Comm, Indices, Mask, Matrix, largest, max_abs, total
 from ..core.arguments import check_fields
-from ..core.corners import lumped_entries
+from ..core.corners import lump_masses
 from ..core.errors import InputError
 from ..core.quantities import Between
 from ..core.surfaces import ContactSurface
@@ -119,14 +119,14 @@ class Redistributed:
 
         # M_l, and Pᵀ M_l P, Pᵀ C P and the load beside it, level by level: the last level is
         # applied to velocities first.
-        lumped = algebra.local(*lumped_entries(surface, nodal), system.rows)
+        lumped = algebra.local(*lump_masses(surface, nodal), system.rows)
         moved = algebra.combine([(1.0 - lumping, system.M), (lumping, lumped)])
         C = system.C
         load = system.load
         for P in transfer_to_neighbours(system, massless, contact, nodal):
             moved = algebra.congruence(P, moved)
             C = None if C is None else algebra.congruence(P, C)
-            load = load.handed_over(P)
+            load = load.transform_viscous(P)
 
         # D of every body, on its nodes off the contact.
         inner = ~(contact | still)

@@ -56,7 +56,7 @@ def transfer_to_neighbours(
         tried = remaining & ~tied if exact else remaining
         ready, entries = _fit_rows(system, tried, donors, nodal, exact=exact)
         if largest(algebra.comm, len(ready)):
-            levels.append(algebra.replaced_rows(system.rows, ready, entries))
+            levels.append(algebra.replace_identity_rows(system.rows, ready, entries))
             remaining[ready] = False
             donors |= contact & np.isin(node, node[ready])
         elif exact:

@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Protocol
 
-from ..core.arguments import check_fields, checked
+from ..core.arguments import check_arguments, check_fields
 from ..core.errors import InputError
 from ..core.quantities import RATIO, Between, NotNegative, Positive, Unit
 
@@ -62,7 +62,7 @@ class LinearElastic:
             )
 
     @classmethod
-    @checked
+    @check_arguments
     def from_wave_speeds(
         cls,
         c_p: Annotated[float, Positive, Unit("m/s"), "c_p"],
@@ -253,7 +253,7 @@ class Rayleigh:
         check_fields(self)
 
     @classmethod
-    @checked
+    @check_arguments
     def from_frequencies(
         cls,
         f1: Annotated[float, Positive, Unit("Hz"), "the frequency f1"],
@@ -303,7 +303,7 @@ class Rayleigh:
         """Return (alpha, beta), whatever the material."""
         return self.alpha, self.beta
 
-    @checked
+    @check_arguments
     def ratio(self, f: Annotated[float, Positive, Unit("Hz"), "the frequency f"]) -> float:
         """Return the damping ratio alpha / (2 w) + beta w / 2 of a mode of frequency f = w / 2 pi.
 

@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 
 from ..core.algebra import Array, largest, max_abs
-from ..core.arguments import checked
+from ..core.arguments import check_arguments
 from ..core.checks import array, whole
 from ..core.errors import InputError
 from ..core.quantities import RATIO, Finite, Remedy, Unit
@@ -20,7 +20,7 @@ ALIKE = 0.05  # of a weight: what 9.81 for 9.80665, or a rounded unit weight, is
 SHARE = 0.1  # of the unknowns of a body: a load on so many is no traction
 
 
-@checked
+@check_arguments
 def with_weight(
     system: Annotated[SemiDiscreteSystem, Remedy("give a system, such as fem.assemble returns")],
     *,

@@ -24,7 +24,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from ..core.algebra import Array
-from ..core.checks import array, instance, several, shown
+from ..core.checks import array, instance, quote, several
 from ..core.errors import InputError, StepFailure
 from .motion import (
     ConstrainedSystem,
@@ -93,7 +93,7 @@ def bilateral_motion(
     times = array(owner, "times", times, (None,))
     if len(times) < 2 or np.any(np.diff(times) <= 0.0):
         raise InputError(
-            f"{owner}: times are {shown(times)}; give two or more that increase, the first the "
+            f"{owner}: times are {quote(times)}; give two or more that increase, the first the "
             "start"
         )
     check_tolerance(owner, rtol)

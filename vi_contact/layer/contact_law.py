@@ -34,7 +34,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
 from ..core.algebra import Array
-from ..core.checks import instance, number, shown
+from ..core.checks import instance, number, quote
 from ..core.errors import InputError
 from ..core.quantities import RATIO, Unit
 from ..core.surfaces import ContactSurface
@@ -215,7 +215,7 @@ def contact_layer(
         )
     if not (metric is Metric.BLENDED or metric is Metric.FLAT):
         raise InputError(
-            f"contact_layer: a law cannot have {shown(metric)}; give Metric.BLENDED or Metric.FLAT"
+            f"contact_layer: a law cannot have {quote(metric)}; give Metric.BLENDED or Metric.FLAT"
         )
     a = 0.5 * width if start is None else check_size("contact_layer", "start", start, "m")
     k = strength * mass * speed**2 / width**2

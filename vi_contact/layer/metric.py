@@ -18,7 +18,7 @@ the boundary are unchanged.
 
 from enum import Enum
 
-from ..core.checks import shown
+from ..core.checks import quote
 from ..core.errors import InputError
 from .layer import Layer
 
@@ -48,7 +48,7 @@ class Metric(Enum):
     def _missing_(cls, value: object) -> "Metric":
         """Raise InputError for a value that names no metric."""
         known = ", ".join(repr(metric.value) for metric in cls)
-        raise InputError(f"Metric: value is {shown(value)}; give one of {known}")
+        raise InputError(f"Metric: value is {quote(value)}; give one of {known}")
 
     def reaction(self, layer: Layer, g: float, rho: float, rate: float, free: float) -> float:
         """Return lambda [N] of g ρ̈ = g ``free`` + lambda, positive away from the obstacle.

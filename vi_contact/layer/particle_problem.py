@@ -12,7 +12,7 @@ from typing import Annotated
 
 import numpy as np
 
-from ..core.arguments import checked
+from ..core.arguments import check_arguments
 from ..core.checks import number
 from ..core.problem import ContactProblem
 from ..core.quantities import Finite, NotNegative, Positive, Unit
@@ -22,7 +22,7 @@ from ..fem.matrices.own_matrices import system_from_arrays
 from ..laws.mass import ConsistentMass
 
 
-@checked
+@check_arguments
 def particle_problem(
     mass: Annotated[float, Positive, Unit("kg")],
     *,

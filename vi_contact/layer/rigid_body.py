@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from ..core.algebra import Array
-from ..core.checks import array, number, shape_of
+from ..core.checks import array, find_shape, number
 from ..core.errors import InputError
 from .layer import check_size
 from .motion import ConstrainedSystem, check_positive
@@ -81,7 +81,7 @@ class RigidBody:
     def __post_init__(self) -> None:
         owner = "RigidBody"
         check_size(owner, "the body's mass", self.mass, "kg")
-        is_matrix = len(shape_of(self.inertia)) == 2
+        is_matrix = len(find_shape(self.inertia)) == 2
         array(owner, "inertia", self.inertia, (3, 3) if is_matrix else (3,), unit="kg m²")
         if not callable(self.point) or isinstance(self.point, type):
             array(owner, "point", self.point, (3,), unit="m")

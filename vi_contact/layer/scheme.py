@@ -149,7 +149,7 @@ class BoundaryLayer(Midpoint):
         # The pressures where some gap is inside the layer, at the beginning or at the end.
         pressure = np.zeros(surface.total)
         if min(old.min(), free.min()) < self.law.layer.width:
-            compliances: WeakKeyDictionary[EffectiveMatrix, Array] = problem.equations.cached(
+            compliances: WeakKeyDictionary[EffectiveMatrix, Array] = problem.equations.make_once(
                 "layer", WeakKeyDictionary
             )
             if A not in compliances:  # B A⁻¹ Bᵀ (m, m), made once for every A

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from vi_contact.core.arguments import check_fields
-from vi_contact.core.checks import MOST_CELLS, counted
+from vi_contact.core.checks import MOST_CELLS, check_count
 from vi_contact.core.errors import InputError
 from vi_contact.core.quantities import Unit
 from vi_contact.meshes.grid import Array, Grid, add_grids, lattice
@@ -104,4 +104,6 @@ def check_box(lengths: Sequence[float], divisions: Sequence[int]) -> None:
         raise InputError(
             f"divisions is {tuple(divisions)}: give whole numbers of cells, at least 1"
         )
-    counted("mesh", f"divisions {tuple(divisions)}", math.prod(divisions), "cells", most=MOST_CELLS)
+    check_count(
+        "mesh", f"divisions {tuple(divisions)}", math.prod(divisions), "cells", most=MOST_CELLS
+    )

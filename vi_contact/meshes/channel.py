@@ -18,7 +18,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from vi_contact.core.arguments import check_fields
-from vi_contact.core.checks import MOST_CELLS, counted
+from vi_contact.core.checks import MOST_CELLS, check_count
 from vi_contact.core.errors import InputError
 from vi_contact.core.quantities import Positive, Unit
 from vi_contact.meshes.extract import MeshArrays, add_arrays
@@ -82,7 +82,7 @@ class ChannelMesh:
         else:
             around = (self.outer_width + 2.0 * self.height) / self.size + self.width / self.far
             cells = max(around, self.width / self.far * (self.depth / self.far))
-        counted("channel", f"a cell size of {self.size} m", cells, "cells", most=MOST_CELLS)
+        check_count("channel", f"a cell size of {self.size} m", cells, "cells", most=MOST_CELLS)
 
     @property
     def x(self) -> tuple[float, ...]:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from vi_contact.core.algebra import Array
-from vi_contact.core.checks import at, shown
+from vi_contact.core.checks import describe_point, quote
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.extract import MeshArrays, Source, add_arrays, arrays_of
 from vi_contact.meshes.rows import Mask, Rows, cell_sides, number_alike, number_parts, vertex_count
@@ -212,12 +212,12 @@ def weld(arrays: MeshArrays, first: str, second: str) -> MeshArrays:
     several = replaced[partners > 1]
     if len(several):
         raise InputError(
-            f"group '{first}' has several nodes at {at(arrays.points[several[0]])}, of bodies that "
-            f"meet there, and '{second}' can be welded to one only: weld these bodies first, or "
-            f"give '{second}' first"
+            f"group '{first}' has several nodes at {describe_point(arrays.points[several[0]])}, of "
+            f"bodies that meet there, and '{second}' can be welded to one only: weld these bodies "
+            f"first, or give '{second}' first"
         )
     if distance.max(initial=0.0) > 1e-9 * size:
-        where = at(arrays.points[replaced[np.argmax(distance)]])
+        where = describe_point(arrays.points[replaced[np.argmax(distance)]])
         raise InputError(
             f"group '{second}' has a node at {where}, {distance.max():.3g} m away from every node "
             f"of '{first}': weld only sides that are divided alike"
@@ -262,7 +262,7 @@ def _make_joint(
     names = tuple(between) if not isinstance(between, str) else ()
     if len(names) != 2 or names[0] == names[1]:
         raise InputError(
-            f"CutOpen: between is {shown(between)}; give the names of two groups of cells"
+            f"CutOpen: between is {quote(between)}; give the names of two groups of cells"
         )
     if inside is not None or towards is not None:
         raise InputError(

@@ -19,7 +19,7 @@ from tempfile import TemporaryDirectory
 from typing import Annotated, Any
 
 from vi_contact.core.arguments import check_fields
-from vi_contact.core.checks import number, shown
+from vi_contact.core.checks import number, quote
 from vi_contact.core.errors import InputError
 from vi_contact.core.quantities import Between, Positive, Unit
 from vi_contact.meshes.geo_script import PREFIX, rewrite_script
@@ -66,12 +66,12 @@ class GeoFile:
     def __post_init__(self) -> None:
         if not isinstance(self.numbers, Mapping):
             raise InputError(
-                f"GeoFile: numbers is {shown(self.numbers)}; give names and their values"
+                f"GeoFile: numbers is {quote(self.numbers)}; give names and their values"
             )
         for name, value in self.numbers.items():
             if not (isinstance(name, str) and name.isascii() and name.isidentifier()):
                 raise InputError(
-                    f"GeoFile: numbers has the name {shown(name)}; give a name of the script"
+                    f"GeoFile: numbers has the name {quote(name)}; give a name of the script"
                 )
             number("GeoFile", f"numbers of '{name}'", value)
         check_fields(self)

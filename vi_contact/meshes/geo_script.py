@@ -17,7 +17,7 @@ from pathlib import Path
 from stat import S_ISREG
 from typing import NamedTuple
 
-from vi_contact.core.checks import shown
+from vi_contact.core.checks import quote
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.geo_words import (
     FIELD_OPTIONS,
@@ -117,7 +117,7 @@ def _read(path: Path) -> str:
         text = data.decode("utf-8-sig")
     except (OSError, ValueError) as error:
         raise InputError(
-            f"Gmsh script {shown(str(path))} cannot be read ({error}): check the path"
+            f"Gmsh script {quote(str(path))} cannot be read ({error}): check the path"
         ) from None
     if len(data) > LARGEST:
         raise InputError(f"{path}: the script has more than {LARGEST} bytes: mesh it yourself")
@@ -399,7 +399,7 @@ def _write_sentence(refused: Sequence[tuple[Token, bool]]) -> str:
     parts = []
     if foreign:
         listed = foreign[:MOST_PLACES]
-        places = ", ".join(f"line {token.line} has {shown(token.word)}" for token in listed)
+        places = ", ".join(f"line {token.line} has {quote(token.word)}" for token in listed)
         unlisted = len(foreign) - MOST_PLACES
         ending = f", and {unlisted} more" if unlisted > 0 else ""
         pronoun = "them" if len(foreign) > 1 else "it"

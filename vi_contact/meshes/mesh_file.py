@@ -14,7 +14,7 @@ import shutil
 import struct
 from pathlib import Path
 
-from vi_contact.core.checks import shown
+from vi_contact.core.checks import quote
 from vi_contact.core.errors import InputError
 
 MAGIC = b"$MeshFormat"
@@ -36,9 +36,9 @@ def safe_copy(file: Path, folder: Path) -> Path:
             shutil.copyfile(file, copy)
     except OSError as error:  # a name that is too long, what may not be looked into
         why = f"{error.strerror}): check the path and its permissions"
-        raise InputError(f"mesh file {shown(str(file))} cannot be read ({why}") from None
+        raise InputError(f"mesh file {quote(str(file))} cannot be read ({why}") from None
     if not exists:
-        name = str(file) if "\0" not in str(file) else shown(str(file))
+        name = str(file) if "\0" not in str(file) else quote(str(file))
         raise InputError(
             f"mesh file {name} does not exist: check the path, or write one (python3 meshes --help)"
         )

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from vi_contact.core.arguments import check_fields
-from vi_contact.core.checks import MOST_CELLS, counted
+from vi_contact.core.checks import MOST_CELLS, check_count
 from vi_contact.core.errors import InputError
 from vi_contact.core.quantities import Unit
 from vi_contact.meshes.block import check_box
@@ -53,7 +53,7 @@ class WallMesh:
                     f"the cell size is {self.size} m: give one above 0 and up to the wall's sides"
                 )
             cells = self.width / self.size * (self.height / self.size)
-            counted("wall", f"a cell size of {self.size} m", cells, "cells", most=MOST_CELLS)
+            check_count("wall", f"a cell size of {self.size} m", cells, "cells", most=MOST_CELLS)
 
     def build(self, gmsh: Any) -> None:
         """Add the wall to Gmsh's current model."""

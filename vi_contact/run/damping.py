@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..core.algebra import Array, Mask, total
-from ..core.checks import shown
+from ..core.checks import quote
 from ..core.problem import ContactProblem
 from ..core.state_checks import check_problem_given
 from ..core.system import SemiDiscreteSystem
@@ -47,7 +47,7 @@ def first_modes(problem: ContactProblem) -> FirstModes:
     """
     check_problem_given("first_modes", problem)
     surface, frictional = problem.surface, problem.frictional
-    known: list[tuple[Any, bool, FirstModes]] = problem.system.cached(KNOWN, list)
+    known: list[tuple[Any, bool, FirstModes]] = problem.system.make_once(KNOWN, list)
     for one, rubbing, modes in known:
         if one is surface and rubbing == frictional:
             return modes
@@ -64,7 +64,7 @@ def damping_in_words(problem: ContactProblem, *, unknown: str = "") -> str:
     law = "; ".join(_sources(system))
     if not law:
         return "none"
-    known: list[tuple[Any, bool, FirstModes]] = system.cached(KNOWN, list)
+    known: list[tuple[Any, bool, FirstModes]] = system.make_once(KNOWN, list)
     for surface, rubbing, modes in known:
         if surface is problem.surface and rubbing == problem.frictional:
             pairs = enumerate(zip(modes.ratios, modes.periods, strict=True), start=1)
@@ -153,7 +153,7 @@ def _sources(system: SemiDiscreteSystem) -> Iterator[str]:
     if isinstance(forms.damping, DampingRatio):
         yield f"{_ratios(forms)} at {_frequencies(forms.damping)}"
     elif not isinstance(forms.damping, NoDamping):
-        yield shown(forms.damping)
+        yield quote(forms.damping)
     if forms.own_damping:
         yield "a damping form of its own"
     boundaries = [f"{type(one).__name__} on '{one.facets.name}'" for one in forms.boundaries]

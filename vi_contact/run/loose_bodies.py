@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.algebra import Array, Indices, Mask, from_each
-from ..core.checks import at
+from ..core.checks import describe_point
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..laws.free_motions import free_motions, rows_of_bodies
@@ -103,8 +103,8 @@ def judge_loose_bodies(problem: ContactProblem) -> Iterator[tuple[str, bool]]:
     """
     for body in find_loose_bodies(problem):
         what = (
-            f"nothing holds the body of {body.nodes} nodes around {at(body.middle)}, and no "
-            "contact touches it"
+            f"nothing holds the body of {body.nodes} nodes around {describe_point(body.middle)}, "
+            "and no contact touches it"
         )
         if body.coinciding:
             yield (

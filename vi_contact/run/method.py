@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from ..core.algebra import from_each, max_abs
-from ..core.checks import at, provides, real, several, shown
+from ..core.checks import describe_point, provides, quote, real, several
 from ..core.collective import Parts, agree, together
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
-from ..core.state_checks import check_problem_given, check_sizes, start_time
+from ..core.state_checks import check_problem_given, check_sizes, read_start_time
 from ..core.step import Scheme, Solver, State
 from ..laws.mass import ConsistentMass
 from ..schemes.trapezoidal import Trapezoidal
@@ -100,7 +100,7 @@ def choose_method(
     if first is None:
         first = Automatic()
     method = Method(problem, scheme, [first, *escalation], dt, tolerance)
-    size = step_plan(dt, steps, t_end, start_time(owner, state)).dt(0)
+    size = step_plan(dt, steps, t_end, read_start_time(owner, state)).dt(0)
     with together(comm):  # what is the user's own may fail on one rank
         method.bind()
         problem.equations.forget_loads()
@@ -178,7 +178,7 @@ def check_methods(owner: str, solver: Any, escalation: Any, tolerance: Any) -> N
         check_solver(owner, other, "a solver of escalation")
     if not 0.0 < real(tolerance) <= 1.0:
         raise InputError(
-            f"{owner}: tolerance is {shown(tolerance)}; give a relative residual above 0, such as "
+            f"{owner}: tolerance is {quote(tolerance)}; give a relative residual above 0, such as "
             "1e-9"
         )
 
@@ -214,6 +214,6 @@ def check_state(
     if inside > SLACK * tolerance * max(sizes):
         worst = np.concatenate(from_each(surface.comm, surface.points[gap == -inside]))[0]
         raise InputError(
-            f"{owner}: the state is {inside:.3g} m inside the obstacle at {at(worst)}: give a "
-            "state with every gap >= 0"
+            f"{owner}: the state is {inside:.3g} m inside the obstacle at {describe_point(worst)}: "
+            "give a state with every gap >= 0"
         )

@@ -5,7 +5,7 @@ from typing import Annotated
 import numpy as np
 
 from ..core.algebra import Algebra, Array, Matrix, SerialFactor, SerialMatrix
-from ..core.arguments import checked
+from ..core.arguments import check_arguments
 from ..core.errors import InputError
 from ..core.quantities import Positive, Remedy
 from ..core.system import SemiDiscreteSystem
@@ -14,7 +14,7 @@ from ..core.system import SemiDiscreteSystem
 SHIFT, RIGID = (1e-6, 1e-13)
 
 
-@checked
+@check_arguments
 def lowest_frequency(
     system: Annotated[SemiDiscreteSystem, Remedy("give a system, such as fem.assemble returns")],
     *,

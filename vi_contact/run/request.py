@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from ..core.algebra import Comm
-from ..core.arguments import check
+from ..core.arguments import check_type
 from ..core.checks import flag, function, optional, provides, several, whole
 from ..core.collective import Parts, agree
 from ..core.errors import InputError
@@ -106,8 +106,8 @@ class RunRequest:
         for recorder in recorders:
             remedy = "give Energy(), Contact(), Probe(…) or another"
             provides(OWNER, "a recorder", recorder, RECORDER, remedy)
-        check(OWNER, "out", self.out, str | Path | None)
-        check(OWNER, "restart", self.restart, bool | str | Path)
+        check_type(OWNER, "out", self.out, str | Path | None)
+        check_type(OWNER, "restart", self.restart, bool | str | Path)
         whole(OWNER, "checkpoint_every", self.checkpoint_every, least=1)
         flag(OWNER, "progress", self.progress)
         flag(OWNER, "changed", self.changed)

@@ -17,7 +17,7 @@ from ..core.algebra import Array
 from ..core.problem import ContactProblem
 from ..core.products import freeze
 from ..core.step import Report, State, StepProblem
-from ..core.system import Load, history_value
+from ..core.system import Load, evaluate_history
 
 
 class Each(dict[int, Any]):
@@ -164,7 +164,7 @@ def loads_of(problems: Sequence[ContactProblem]) -> Loads:
     def rows(t: float) -> Array:
         factors = np.zeros((len(problems), len(vectors)))
         for run, number, history in places:
-            factors[run, number] += history_value(history, t)
+            factors[run, number] += evaluate_history(history, t)
         return np.asarray(body(t) + factors @ vectors)
 
     return Loads(body.constant, rows=rows)

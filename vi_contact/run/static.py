@@ -21,7 +21,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.algebra import EffectiveMatrix, largest, max_abs
-from ..core.checks import at, number, real, shown
+from ..core.checks import describe_point, number, quote, real
 from ..core.collective import Parts, agree, together
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
@@ -101,7 +101,7 @@ def _warn_if_open(problem: ContactProblem, state: State) -> None:
             "a softer side 2, which should be meshed as finely or be side 1",
             state.t,
             100.0 * lost / area,
-            at(place),
+            describe_point(place),
         )
 
 
@@ -224,7 +224,7 @@ def _each_after_the_other(
 def _increasing(times: Iterable[float], start: float) -> list[float]:
     """Return the times [s] as a list; InputError unless they increase from the start [s] on."""
     if not isinstance(times, Iterable) or isinstance(times, str | bytes):
-        raise InputError(f"load steps at {shown(times)}: give times in seconds")
+        raise InputError(f"load steps at {quote(times)}: give times in seconds")
     order = [real(t) for t in times]
     ways = np.diff([start, *order])
     if not (np.all(np.isfinite(ways)) and np.all(ways >= 0.0) and np.all(ways[1:] > 0.0)):

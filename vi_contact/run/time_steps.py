@@ -14,7 +14,7 @@ from itertools import pairwise
 from math import ceil, inf, isfinite
 from typing import Annotated, Any
 
-from ..core.checks import number, shown, whole
+from ..core.checks import number, quote, whole
 from ..core.errors import InputError
 from ..core.quantities import Unit
 
@@ -44,7 +44,7 @@ class Schedule:
             pairs = [(dt, float(until)) for dt, until in self.pieces]
         except (TypeError, ValueError, OverflowError):
             raise InputError(
-                f"Schedule pieces are {shown(self.pieces)}: give pairs ((dt, until), …) in seconds"
+                f"Schedule pieces are {quote(self.pieces)}: give pairs ((dt, until), …) in seconds"
             ) from None
         if not pairs:
             raise InputError(
@@ -78,7 +78,7 @@ class HalvedAtImpact:
         if not isinstance(self.dt, Schedule):
             object.__setattr__(self, "dt", _positive(self.dt))
         remedy = (
-            f"HalvedAtImpact halvings is {shown(self.halvings)}: give a whole number from 0 to "
+            f"HalvedAtImpact halvings is {quote(self.halvings)}: give a whole number from 0 to "
             f"{HALVINGS}"
         )
         object.__setattr__(self, "halvings", _read(whole, self.halvings, remedy, most=HALVINGS))
@@ -201,20 +201,20 @@ def _most_steps(steps: int | None, t_end: float | None, t0: float) -> float:
         raise InputError("give either steps or t_end, and not both")
     if t_end is not None:
         remedy = (
-            f"the run goes from {t0:g} s to t_end = {shown(t_end)} s: give a finite t_end "
+            f"the run goes from {t0:g} s to t_end = {quote(t_end)} s: give a finite t_end "
             "after the start"
         )
         if _read(number, t_end, remedy) < t0:
             raise InputError(remedy)
         return inf
-    remedy = f"steps is {shown(steps)}: give a whole number of steps >= 0, or t_end in seconds"
+    remedy = f"steps is {quote(steps)}: give a whole number of steps >= 0, or t_end in seconds"
     return int(_read(whole, steps, remedy))
 
 
 def _positive(dt: Any) -> float:
     """Return a time step [s] as a float; InputError for what is none."""
     remedy = (
-        f"dt is {shown(dt)}: give a positive time step in seconds, a Schedule or HalvedAtImpact"
+        f"dt is {quote(dt)}: give a positive time step in seconds, a Schedule or HalvedAtImpact"
     )
     size = float(_read(number, dt, remedy, positive=True))
     if not 1.0 / LONGEST < size < LONGEST:

@@ -148,7 +148,7 @@ class Group:
         left = [run for run in self._runs if run not in leaving]
         self._go_on_with(left, [run.state for run in left])
         if self._runs and self._dt is not None:  # the problem is new, the factor of A is not
-            self._A = self._scheme.effective_matrix(self._problem, self._dt).factorised_as(self._A)
+            self._A = self._scheme.effective_matrix(self._problem, self._dt).share_factors(self._A)
 
     def advance(self) -> None:
         """Make the next step of all runs; those that cannot make it together leave."""

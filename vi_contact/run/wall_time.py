@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
-from ..core.checks import shown
+from ..core.checks import quote
 from ..core.errors import InputError
 
 # times the longest step and the checkpoint and histories at the end, as long as the longest so far
@@ -37,7 +37,7 @@ def seconds_of(wall_time: object) -> float:
         seconds = 86400 * int(days or 0) + sum(a * b for a, b in zip(units, parts, strict=True))
         if 0 < seconds < 1e9:
             return float(seconds)
-    raise InputError(f"the wall time is {shown(wall_time)}: give {_FORMS}, such as '11:30:00'")
+    raise InputError(f"the wall time is {quote(wall_time)}: give {_FORMS}, such as '11:30:00'")
 
 
 def age() -> float:

@@ -1,6 +1,16 @@
 """Hold what schemes share: two families, the step in displacements, and what does not suit them.
 
-The arguments of the methods of a scheme are those of ``core.step.Scheme``, which explains them.
+A scheme derives from one family, or is like it:
+
+- ``SingleStep``: the contact force is a mean over the step, an impulse; it needs mass at the
+  contact nodes. Midpoint, ZienkiewiczWoodTaylor, SS22, ContactStabilisedNewmark, MoreauJean.
+- ``BalanceStep``: the contact force stands in the balance of forces at a time; contact nodes should
+  have no mass. Newmark, HHT, GeneralisedAlpha, LinearMultistep, Houbolt; Trapezoidal is like it.
+
+Most of them solve for x = u1, the displacement at the end: ``position_step`` poses that step, and
+``end_step`` makes the next state. MoreauJean solves for v1. In all files 0 and 1 are the beginning
+and the end of a step, a bar is a mean over it, and the arguments of the methods are those of
+``core.step.Scheme``, which explains them.
 """
 
 import logging
@@ -37,11 +47,24 @@ class SingleStep:
             )
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
-        """Return the state as it is: there is nothing to prepare."""
+        """Return the state as it is: there is nothing to prepare.
+
+        Args:
+            problem: the problem that is marched; not read.
+            state: the state to go on from.
+            dt: size of the next steps [s]; not read.
+        """
         return state
 
     def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
-        """Return the state with the new velocity: there is nothing to restart."""
+        """Return the state with the new velocity: there is nothing to restart.
+
+        Args:
+            problem: the problem that is marched; not read.
+            state: the state before the impact.
+            v: velocity after the impact (n,) [m/s].
+            dt: size of the next step [s]; not read.
+        """
         return state.with_velocity(v)
 
 
@@ -80,9 +103,13 @@ def position_step(
         A: the effective matrix of this dt.
         dt: size of the step [s].
         b: right-hand side (n,), ``scale`` times newtons.
-        scale: how many times newtons the reactions of the step are.
+        scale: how many times newtons the reactions of the step are, a pure number.
         guess: predicted u1 (n,) [m]; None for free flight, u0 + dt v0.
         active: predicted contact set (m,); None for that of the state.
+
+    Returns:
+        The step: bound is the gap (m,) [m] of the undeformed body at the end, slip is measured from
+        B_t u0 and what the obstacle slides, and slip rates are slips over dt.
     """
     end = state.t + dt
     return StepProblem(
@@ -102,11 +129,11 @@ def position_step(
 
 
 def end_step(step: StepProblem, result: StepResult, u: Array, v: Array) -> State:
-    """Return the state at the end of a step, with the mean reactions r/scale and no memory.
+    """Return the state at the end of a step, with the mean reactions r/scale [N] and no memory.
 
     Args:
         step: the step.
-        result: its answer.
+        result: its answer, with reactions (m,) that are ``scale`` times newtons.
         u: displacement (n,) [m] at the end.
         v: velocity (n,) [m/s] at the end.
     """
@@ -118,6 +145,8 @@ def balance_means(
     problem: ContactProblem, old: State, new: State, dt: float, *, u: Array, f: Array
 ) -> Balance:
     """Return the equation of a step with the mean rates of u and v, and the new reactions.
+
+        M (v1 - v0)/dt + C (u1 - u0)/dt + K u = f - B_nᵀ r_n - B_tᵀ r_t
 
     Args:
         problem: the problem that is marched.
@@ -135,7 +164,11 @@ def check_balance(name: str, problem: ContactProblem) -> None:
     """Check a problem for schemes with contact in the balance of forces.
 
     It warns, once for a problem, of mass at the contact nodes: the energy ½ (r0 g1 - r1 g0) is
-    created whenever a contact opens.
+    created whenever a contact opens. Collective.
+
+    Args:
+        name: the scheme, as one writes it.
+        problem: the problem.
 
     Raises:
         InputError: an impact law on massless contact nodes, which have no momentum to change.
@@ -150,7 +183,9 @@ def check_balance(name: str, problem: ContactProblem) -> None:
         )
     if massless or not surface.some(~surface.bilateral & surface.rigid):
         return
-    warnings = problem.equations.cached(f"warnings of {name}", list, surface)
+
+    # The system keeps a list, which is empty until the first run has warned.
+    warnings = problem.equations.make_once(f"warnings of {name}", list, surface)
     if not warnings and surface.comm.rank == 0:
         log.warning(
             "%s with consistent mass can gain energy whenever a contact opens: leave out "

@@ -28,7 +28,7 @@ import numpy as np
 from ..core.algebra import Array, EffectiveMatrix, max_abs
 from ..core.free_unknowns import solve_free
 from ..core.problem import ContactProblem
-from ..core.sizes import small
+from ..core.sizes import is_small_problem
 from ..core.step import PreparedSolver, State, StepProblem
 from ..core.surfaces import ContactSurface
 from ..solvers.automatic import solver_beside_steps
@@ -59,7 +59,7 @@ def consistent_acceleration(
 
     # Massless unknowns are in equilibrium: the force on them is all reaction.
     moving = np.where(system.massless, 0.0, force)
-    if small(system.algebra.comm, system.rows, 0):
+    if is_small_problem(system.algebra.comm, system.rows, 0):
         a = mass_matrix(problem).factor.solve(moving)
     else:
         a = solve_free(system.algebra, system.M, moving, system.massless, np.zeros_like(force))
@@ -76,6 +76,9 @@ def _accelerate_in_contact(
         state: the state.
         force: f - C v - K u (n,) [N].
         dt: size of the next step [s].
+
+    Returns:
+        As ``consistent_acceleration``.
     """
     surface = problem.surface
     rigid = surface.rigid
@@ -99,6 +102,8 @@ def _accelerate_in_contact(
         if sliding is not None:
             rate = rate - sliding / dt
         slip0 = -rate / dt
+
+    # M a = force - springs - Bᵀr is a step with x = a: the bound a_n <= 0 holds on resting points.
     step = StepProblem(
         A=mass_matrix(problem),
         b=force - springs,
@@ -113,7 +118,7 @@ def _accelerate_in_contact(
         slip0=slip0,
         rate_factor=dt,
     )
-    solver: PreparedSolver = problem.equations.cached(
+    solver: PreparedSolver = problem.equations.make_once(
         "resting contacts",
         lambda: solver_beside_steps(step.A, step.surface).prepare(step.A, step.surface, 1.0),
         surface,
@@ -131,7 +136,7 @@ def mass_matrix(problem: ContactProblem) -> EffectiveMatrix:
         M = system.M if massless is None else system.algebra.with_identity_rows(system.M, massless)
         return EffectiveMatrix(M, system.algebra)
 
-    return system.cached("mass", make)
+    return system.make_once("mass", make)
 
 
 def without_springs(surface: ContactSurface) -> ContactSurface:
@@ -154,7 +159,7 @@ def equilibrate(problem: ContactProblem, state: State) -> State:
 
     # The block of K of the massless unknowns, under the load that the others leave on them.
     load = system.load(state.t) - system.K @ np.where(layer, 0.0, state.u)
-    A = system.cached(
+    A = system.make_once(
         "massless block",
         lambda: EffectiveMatrix(system.algebra.block(system.K, layer), system.algebra),
     )
@@ -179,6 +184,8 @@ def equilibrate(problem: ContactProblem, state: State) -> State:
         friction=problem.friction,
         slip0=problem.slip_origin(state.u, state.t, state.t),
     )
+
+    # Solve it as any step, and put the answer into the massless unknowns alone.
     solvers = [solver_beside_steps(A, surface)]
     certified = CertifiedSolver(problem, A, 1.0, solvers, TOLERANCE, surface=surface)
     result, _, _ = certified.solve(step)

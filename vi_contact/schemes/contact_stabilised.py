@@ -64,7 +64,20 @@ class ContactStabilisedNewmark(SingleStep):
     def step(
         self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
     ) -> StepProblem:
-        """Return the step with b of the module's equations."""
+        """Return the step with b of the module's equations.
+
+        Args:
+            problem: the problem that is marched.
+            state: u [m] and v [m/s] at t0, (n,) each.
+            A: 4/dt² M + 2/dt C + K (n, n) [N/m].
+            dt: size of the step [s].
+
+        Returns:
+            The step in x = u1 [m], with b and reactions twice newtons; its guess is u_p.
+
+        Raises:
+            StepFailure: the projection cannot be certified.
+        """
         system = problem.equations
         free = state.u + dt * state.v
         u_p = free
@@ -91,12 +104,30 @@ class ContactStabilisedNewmark(SingleStep):
         result: StepResult,
         dt: float,
     ) -> State:
-        """Return the state with v1 = v0 + 2/dt (u1 - u_p)."""
+        """Return the state with v1 = v0 + 2/dt (u1 - u_p).
+
+        Args:
+            problem: the problem that is marched; not read.
+            state: the state at t0.
+            step: what ``step`` returned for it; its guess is u_p.
+            result: its answer, x = u1 (n,) [m]; the state gets half its reactions [N].
+            dt: size of the step [s].
+        """
         v = state.v + 2.0 / dt * (result.x - step.guess)
         return end_step(step, result, result.x, v)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the averages of the module's equation."""
+        """Return the averages of the module's equation.
+
+        The projection adds w = u_p - u0 - dt v0 to the displacement and nothing to the velocity, so
+        that u1 - u0 = ½ dt (v0 + v1) + w. The ledger finds w·M (v1 - v0)/dt as algorithmic loss.
+
+        Args:
+            problem: the problem that is marched.
+            old: the state at t0.
+            new: the state at t1, before the impact law.
+            dt: size of the step [s].
+        """
         u = 0.5 * (old.u + new.u)
         f = problem.equations.load_at(old.t + 0.5 * dt)
         return balance_means(problem, old, new, dt, u=u, f=f)
@@ -128,19 +159,22 @@ def project_predictor(
     surface = problem.surface
     system = problem.equations
     rigid = surface.rigid
+
+    # Begin with the points that the prediction puts into the obstacle. Where there are none it is
+    # admissible as it is.
     gap = np.where(rigid, surface.gap(state.t + dt) - surface.normal_values(u), np.inf)
     closed = (gap < 0.0) | (surface.bilateral & rigid)
     if surface.some(np.isnan(gap)) or not surface.some(closed & (gap != 0.0)):
         return u, closed  # nothing is in the way; NaN is refused by the step itself
 
     # Springs are not bounds here, and nothing rubs.
-    bounds: ContactProblem = system.cached(
+    bounds: ContactProblem = system.make_once(
         "admissible predictor, bounds",
         lambda: replace(problem, surface=without_springs(surface), friction=Frictionless()),
         surface,
     )
     M = mass_matrix(problem)
-    solver: CertifiedSolver = system.cached(
+    solver: CertifiedSolver = system.make_once(
         "admissible predictor",
         lambda: CertifiedSolver(
             bounds, M, 1.0, [solver_beside_steps(M, bounds.surface)], TOLERANCE

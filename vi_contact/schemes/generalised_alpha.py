@@ -35,8 +35,8 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from ..core.algebra import Array, EffectiveMatrix
-from ..core.arguments import checked
-from ..core.checks import real, shown
+from ..core.arguments import check_arguments
+from ..core.checks import quote, real
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.quantities import Between
@@ -69,13 +69,26 @@ class AlphaStep(BalanceStep, ABC):
         """Return the state with its acceleration, and massless nodes in equilibrium.
 
         On a restart, and for a new dt, the state is good as it is.
+
+        Args:
+            problem: the problem that is marched.
+            state: the state to go on from. Its memory counts where "of" holds the alpha_m and
+                alpha_f of this member and the time of the state.
+            dt: size of the next steps [s], over which friction looks ahead.
         """
         if np.array_equal(state.memory.get("of", ()), self._owner_of_memory(state.t)):
             return state
         return self._restart(problem, equilibrate(problem, state), dt)
 
     def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
-        """Return the state with the acceleration that fits the new velocity."""
+        """Return the state with the acceleration that fits the new velocity.
+
+        Args:
+            problem: the problem that is marched.
+            state: the state before the impact.
+            v: velocity after the impact (n,) [m/s].
+            dt: size of the next step [s], over which friction looks ahead.
+        """
         return self._restart(problem, state.with_velocity(v), dt)
 
     def _restart(self, problem: ContactProblem, state: State, dt: float) -> State:
@@ -90,8 +103,11 @@ class AlphaStep(BalanceStep, ABC):
         inertia = (1.0 - w.alpha_m) / ((1.0 - w.alpha_f) * w.beta * dt**2)
         return problem.equations.effective(m=inertia, c=w.gamma / (w.beta * dt), k=1.0)
 
-    def _known_rates(self, state: State, dt: float) -> tuple[Array, Array]:
-        """Return v1 and a1 for u1 = 0: their parts that the state before the step fixes."""
+    def _compute_rates_at_zero(self, state: State, dt: float) -> tuple[Array, Array]:
+        """Return v1 [m/s] and a1 [m/s²] for u1 = 0: what the state before the step fixes of them.
+
+        For any u1 they are  v1 + gamma/(beta dt) u1  and  a1 + u1/(beta dt²).
+        """
         w = self.weights
         a0 = state.memory["a"]
         a = (w.beta - 0.5) / w.beta * a0 - (state.u + dt * state.v) / (w.beta * dt**2)
@@ -104,12 +120,24 @@ class AlphaStep(BalanceStep, ABC):
         """Return the step with b of the equation at u1 = 0.
 
         b = f1 - C v1 - (M a_m - alpha_f (f0 - C v0 - K u0 - Bᵀr0))/(1 - alpha_f).
+
+        Args:
+            problem: the problem that is marched.
+            state: u [m], v [m/s], "a" [m/s²] and "reaction" [N] at t0, (n,), or rows (k, n) of
+                several runs.
+            A: that of the module's equations (n, n) [N/m].
+            dt: size of the step [s].
+
+        Returns:
+            The step in x = u1 [m], with b and reactions in newtons.
         """
         system = problem.equations
         w = self.weights
-        v, a = self._known_rates(state, dt)
+        v, a = self._compute_rates_at_zero(state, dt)
         mean = ((1.0 - w.alpha_m) * a + w.alpha_m * state.memory["a"]) / (1.0 - w.alpha_f)
         b = system.load_at(state.t + dt) - system.M @ mean
+
+        # The share of the old forces; Newmark's member has none, and saves the products.
         if w.alpha_f != 0.0:
             ratio = w.alpha_f / (1.0 - w.alpha_f)
             f0 = system.load_at(state.t)
@@ -130,9 +158,16 @@ class AlphaStep(BalanceStep, ABC):
         """Return the state with a1 and v1 from u1.
 
         Massless unknowns get no acceleration and the mean velocity of the step.
+
+        Args:
+            problem: the problem that is marched.
+            state: the state at t0.
+            step: what ``step`` returned for it.
+            result: its answer, x = u1 (n,) [m] and reactions at the end [N].
+            dt: size of the step [s].
         """
         w = self.weights
-        v, a = self._known_rates(state, dt)
+        v, a = self._compute_rates_at_zero(state, dt)
         v += w.gamma / (w.beta * dt) * result.x
         a += result.x / (w.beta * dt**2)
         v = replace_massless(problem, v, (result.x - state.u) / dt)
@@ -144,7 +179,14 @@ class AlphaStep(BalanceStep, ABC):
         return State(step.t, step.k, result.x, v, result.r_n, result.active, memory, result.r_t)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the step's own equation of motion."""
+        """Return the step's own equation of motion: M a_m + C v_f + K u_f = f_f - Bᵀr_f.
+
+        Args:
+            problem: the problem that is marched.
+            old: the state at t0.
+            new: the state at t1, before the impact law.
+            dt: size of the step [s]; not read.
+        """
         return balance_ends(problem, old, new, self.weights.alpha_m, self.weights.alpha_f)
 
 
@@ -159,8 +201,11 @@ def balance_ends(
         new: the state after it.
         m: weight of the old acceleration; the new one has 1 - m.
         f: weight of all else at the old end; the new end has 1 - f.
-        level: how the names "a" and "reaction" end in the memory of the states.
+        level: how the names "a" and "reaction" end in the memory of the states: "_0" in that of
+            ``LinearMultistep``.
     """
+    # The old reactions come from the memory: after an impact they fit the new velocity, and those
+    # of the state itself do not.
     load_at = problem.equations.load_at
     surface = problem.surface
     reaction = old.memory[f"reaction{level}"]
@@ -204,7 +249,7 @@ class GeneralisedAlpha(AlphaStep):
         stable = alpha_m <= alpha_f + SLACK and alpha_f <= 0.5 + SLACK and gamma >= least - SLACK
         stable = stable and np.inf > beta >= 0.5 * gamma - SLACK
         if not stable or not np.isfinite(least + gamma):
-            weights = ", ".join(f"{name}={shown(value)}" for name, value in vars(self).items())
+            weights = ", ".join(f"{name}={quote(value)}" for name, value in vars(self).items())
             raise InputError(
                 f"{weights} are not unconditionally stable, and contact has no highest frequency "
                 "to choose dt by: give alpha_m <= alpha_f <= 1/2, gamma >= 1/2 - alpha_m + "
@@ -217,7 +262,7 @@ class GeneralisedAlpha(AlphaStep):
         return self
 
     @classmethod
-    @checked
+    @check_arguments
     def spectral_radius(
         cls,
         rho_inf: Annotated[

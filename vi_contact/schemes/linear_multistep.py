@@ -127,7 +127,19 @@ class LinearMultistep(BalanceStep):
 
     @classmethod
     def newmark(cls, beta: float = 0.25, gamma: float = 0.5) -> "LinearMultistep":
-        """Return Newmark(beta, gamma) as the q = 2 member."""
+        """Return Newmark(beta, gamma) as the q = 2 member.
+
+        It is Newmark's method in two-step form: v and a are eliminated from three equations of
+        motion (O. C. Zienkiewicz, 1977, A new look at the Newmark, Houbolt and other time stepping
+        formulas).
+
+        Args:
+            beta: weight of a1 in u1, above zero.
+            gamma: weight of a1 in v1.
+
+        Raises:
+            InputError: beta is zero or less, or the member is not unconditionally stable.
+        """
         for name, value in (("beta", beta), ("gamma", gamma)):
             number("LinearMultistep.newmark", name, value)
         if beta <= 0.0:
@@ -137,8 +149,8 @@ class LinearMultistep(BalanceStep):
         b = (beta, 0.5 + gamma - 2.0 * beta, 0.5 - gamma + beta)
         return cls(a=(gamma, 1.0 - 2.0 * gamma, gamma - 1.0), b=b, gamma=(1.0, -2.0, 1.0))
 
-    def _derivatives(self, dt: float) -> tuple[float, float]:
-        """Return dv/du and da/du of the newest level."""
+    def _differentiate_rates(self, dt: float) -> tuple[float, float]:
+        """Return dv/du [1/s] and da/du [1/s²] of the newest level."""
         dv_du = self.a[0] / (dt * self.b[0])
         da_du = self.gamma[0] / (self.mu * dt**2 * self.b[0])
         return dv_du, da_du
@@ -148,7 +160,13 @@ class LinearMultistep(BalanceStep):
 
         A state that has such a past is good as it is. For a new dt the past is filled in anew with
         the acceleration that is known.
+
+        Args:
+            problem: the problem that is marched.
+            state: the state to go on from. Its memory counts where "t" is its time.
+            dt: size of the next steps [s], the distance of the levels in the past.
         """
+        # A past of more levels serves as well: the step reads those from 1 to q - 1 out of it.
         memory = state.memory
         if not np.array_equal(memory.get("t", ()), [state.t]):
             return self._restart(problem, equilibrate(problem, state), dt)
@@ -157,7 +175,14 @@ class LinearMultistep(BalanceStep):
         return self._fill_past(state, memory["a_0"], memory["reaction_0"], dt)
 
     def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
-        """Return the state with the past of the new velocity."""
+        """Return the state with the past of the new velocity.
+
+        Args:
+            problem: the problem that is marched.
+            state: the state before the impact.
+            v: velocity after the impact (n,) [m/s].
+            dt: size of the next step [s].
+        """
         return self._restart(problem, state.with_velocity(v), dt)
 
     def _restart(self, problem: ContactProblem, state: State, dt: float) -> State:
@@ -184,19 +209,30 @@ class LinearMultistep(BalanceStep):
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """Return A of the module's equations."""
-        dv_du, da_du = self._derivatives(dt)
+        dv_du, da_du = self._differentiate_rates(dt)
         return problem.equations.effective(m=da_du, c=dv_du, k=1.0)
 
-    def _levels(self, state: State) -> dict[str, Array]:
-        """Return u, v and a at the q levels before the step, of which 1 is the newest."""
+    def _collect_levels(self, state: State) -> dict[str, Array]:
+        """Return u, v and a at the q levels before the step, of which 1 is the newest.
+
+        What the memory of the state calls level r is level r + 1 for the step.
+        """
         levels = {"u_1": state.u, "v_1": state.v, "a_1": state.memory["a_0"]}
         for r in range(2, len(self.a)):
             for name in "uva":
                 levels[f"{name}_{r}"] = state.memory[f"{name}_{r - 1}"]
         return levels
 
-    def _known_rates(self, levels: dict[str, Array], dt: float) -> tuple[Array, Array]:
-        """Return v and a of the new level for u = 0: parts of eqs. 11c,d that the past fixes."""
+    def _compute_rates_at_zero(self, levels: dict[str, Array], dt: float) -> tuple[Array, Array]:
+        """Return v [m/s] and a [m/s²] of the new level for u = 0: what the past fixes of them.
+
+        Eqs. 11c,d of the boundary method are eqs. 11a,b solved for the newest rates,
+
+            v = (sum_r a[r] u(p-r) - dt sum_{r>0} b[r] v(p-r)) / (dt b[0])
+            a = (sum_r gamma[r] u(p-r) - mu dt² sum_{r>0} b[r] a(p-r)) / (mu dt² b[0])
+
+        here with u(p) = 0.
+        """
         v = np.zeros_like(levels["u_1"])
         a = np.zeros_like(v)
         for r in range(1, len(self.a)):
@@ -207,9 +243,20 @@ class LinearMultistep(BalanceStep):
     def step(
         self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
     ) -> StepProblem:
-        """Return the step with b = f(t_p) - M a_known - C v_known."""
+        """Return the step with b = f(t_p) - M a - C v, the rates for u(p) = 0.
+
+        Args:
+            problem: the problem that is marched.
+            state: u [m], v [m/s] and the past in its memory at t0, (n,), or rows (k, n) of several
+                runs.
+            A: that of the module's equations (n, n) [N/m].
+            dt: size of the step [s], the distance of the levels.
+
+        Returns:
+            The step in x = u(p) [m], with b and reactions in newtons.
+        """
         system = problem.equations
-        v, a = self._known_rates(self._levels(state), dt)
+        v, a = self._compute_rates_at_zero(self._collect_levels(state), dt)
         b = system.load_at(state.t + dt) - system.M @ a
         if system.C is not None:
             b -= system.C @ v
@@ -223,13 +270,23 @@ class LinearMultistep(BalanceStep):
         result: StepResult,
         dt: float,
     ) -> State:
-        """Return the state with velocity and acceleration from eqs. 11c,d, its levels one older."""
-        levels = self._levels(state)
-        v_known, a_known = self._known_rates(levels, dt)
-        dv_du, da_du = self._derivatives(dt)
+        """Return the state with velocity and acceleration from eqs. 11c,d, its levels one older.
+
+        Massless unknowns get no acceleration and the mean velocity of the step.
+
+        Args:
+            problem: the problem that is marched.
+            state: the state at t0.
+            step: what ``step`` returned for it.
+            result: its answer, x = u(p) (n,) [m] and reactions at the end [N].
+            dt: size of the step [s].
+        """
+        levels = self._collect_levels(state)
+        v_at_zero, a_at_zero = self._compute_rates_at_zero(levels, dt)
+        dv_du, da_du = self._differentiate_rates(dt)
         mean = (result.x - state.u) / dt
-        v = replace_massless(problem, v_known + dv_du * result.x, mean)
-        a = replace_massless(problem, a_known + da_du * result.x, 0.0)
+        v = replace_massless(problem, v_at_zero + dv_du * result.x, mean)
+        a = replace_massless(problem, a_at_zero + da_du * result.x, 0.0)
         memory = {
             **levels,
             "a_0": a,
@@ -240,5 +297,12 @@ class LinearMultistep(BalanceStep):
         return State(step.t, step.k, result.x, v, result.r_n, result.active, memory, result.r_t)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the mean of the equations of motion at both ends, the old one after its impact."""
+        """Return the mean of the equations of motion at both ends, the old one after its impact.
+
+        Args:
+            problem: the problem that is marched.
+            old: the state at t0.
+            new: the state at t1, before the impact law.
+            dt: size of the step [s]; not read.
+        """
         return balance_ends(problem, old, new, 0.5, 0.5, "_0")

@@ -104,12 +104,18 @@ class MoreauJean(SingleStep):
         )
 
     def _mean_load(self, problem: ContactProblem, t: float, dt: float) -> Array:
-        """Return f_θ (n,) [N] of the step from t to t + dt [s]."""
+        """Return f_θ = (1 - theta) f(t) + theta f(t + dt), (n,) [N]."""
         load_at = problem.equations.load_at
         return (1.0 - self.theta) * load_at(t) + self.theta * load_at(t + dt)
 
     def _bound(self, problem: ContactProblem, state: State, dt: float) -> Array:
-        """Return the largest normal velocities (m,) [m/s] of closed points after the step."""
+        """Return the largest normal velocities (m,) [m/s] of closed points after the step.
+
+        Args:
+            problem: the problem that is marched.
+            state: the state at t0.
+            dt: size of the step [s].
+        """
         surface = problem.surface
         advance = surface.advance(state.t, state.t + dt)
         obstacle = 0.0 if advance is None else -advance / dt
@@ -127,6 +133,16 @@ class MoreauJean(SingleStep):
         """Return the step in x = v1.
 
         b = M v0 + dt (f_θ - K (u0 + theta (1 - theta) dt v0) - (1 - theta) C v0).
+
+        Args:
+            problem: the problem that is marched.
+            state: u [m] and v [m/s] at t0, (n,) each.
+            A: M + theta dt C + theta² dt² K (n, n) [kg].
+            dt: size of the step [s].
+
+        Returns:
+            The step in x = v1 [m/s], with b and reactions in N s; ``bound`` holds normal velocities
+            (m,) [m/s], infinite on open points.
         """
         system = problem.equations
         surface = problem.surface
@@ -169,12 +185,27 @@ class MoreauJean(SingleStep):
         result: StepResult,
         dt: float,
     ) -> State:
-        """Return the state with u1 = u0 + dt v_θ."""
+        """Return the state with u1 = u0 + dt v_θ.
+
+        Args:
+            problem: the problem that is marched; not read.
+            state: the state at t0.
+            step: what ``step`` returned for it.
+            result: its answer, x = v1 (n,) [m/s]; the state gets its impulses [N s] over dt.
+            dt: size of the step [s].
+        """
         u = state.u + dt * ((1.0 - self.theta) * state.v + self.theta * result.x)
         return end_step(step, result, u, result.x)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the averages of the module's equation."""
+        """Return the averages of the module's equation, divided by dt.
+
+        Args:
+            problem: the problem that is marched.
+            old: the state at t0.
+            new: the state at t1, whose reactions are means over the step.
+            dt: size of the step [s].
+        """
         u = old.u + self.theta * (new.u - old.u)
         f = self._mean_load(problem, old.t, dt)
         return balance_means(problem, old, new, dt, u=u, f=f)

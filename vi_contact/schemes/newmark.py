@@ -50,5 +50,15 @@ class Newmark(AlphaStep):
         return GeneralisedAlpha(0.0, 0.0, self.beta, self.gamma)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the equations of both ends, weighted so that M a dt is the change of momentum."""
+        """Return the equations of both ends, weighted so that M a dt is the change of momentum.
+
+        The weights are 1 - gamma at the beginning and gamma at the end, of forces and accelerations
+        alike.
+
+        Args:
+            problem: the problem that is marched.
+            old: the state at t0, with "a" and "reaction" in its memory.
+            new: the state at t1, before the impact law.
+            dt: size of the step [s]; not read.
+        """
         return balance_ends(problem, old, new, 1.0 - self.gamma, 1.0 - self.gamma)

@@ -19,7 +19,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..core.algebra import EffectiveMatrix
-from ..core.checks import real, shown
+from ..core.checks import quote, real
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.step import Balance, State, StepProblem, StepResult
@@ -45,7 +45,7 @@ class SS22(SingleStep):
     def __post_init__(self) -> None:
         if not np.inf > real(self.theta2) >= real(self.theta1) >= 0.5:
             raise InputError(
-                f"SS22 weights theta1={shown(self.theta1)}, theta2={shown(self.theta2)}: give "
+                f"SS22 weights theta1={quote(self.theta1)}, theta2={quote(self.theta2)}: give "
                 "theta2 >= theta1 >= 0.5, the unconditionally stable range"
             )
 
@@ -58,8 +58,21 @@ class SS22(SingleStep):
     def step(
         self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
     ) -> StepProblem:
-        """Return the step with b = A (u0 + dt v0) + (f - C v0 - K (u0 + theta1 dt v0))/theta2."""
+        """Return the step with b = A (u0 + dt v0) + (f - C v0 - K (u0 + theta1 dt v0))/theta2.
+
+        Args:
+            problem: the problem that is marched.
+            state: u [m] and v [m/s] at t0, (n,), or rows (k, n) of several runs.
+            A: 2/(theta2 dt²) M + 2 theta1/(theta2 dt) C + K (n, n) [N/m].
+            dt: size of the step [s].
+
+        Returns:
+            The step in x = u1 [m], with b and reactions 1/theta2 times newtons.
+        """
         system = problem.equations
+
+        # The equation is one for alpha = 2 (u1 - guess)/dt², where guess is free flight. A times
+        # u1 - guess balances, over theta2, what is left of the forces there.
         guess = state.u + dt * state.v
         u_mean = state.u + self.theta1 * dt * state.v
         force = system.load_at(state.t + self.theta1 * dt) - system.K @ u_mean
@@ -76,12 +89,27 @@ class SS22(SingleStep):
         result: StepResult,
         dt: float,
     ) -> State:
-        """Return the state with alpha = 2 (u1 - u0 - dt v0)/dt², v1 = v0 + dt alpha."""
+        """Return the state with alpha = 2 (u1 - u0 - dt v0)/dt², v1 = v0 + dt alpha.
+
+        Args:
+            problem: the problem that is marched; not read.
+            state: the state at t0.
+            step: what ``step`` returned for it; its guess is u0 + dt v0.
+            result: its answer, x = u1 (n,) [m]; the state gets theta2 times its reactions [N].
+            dt: size of the step [s].
+        """
         v = state.v + 2.0 * (result.x - step.guess) / dt
         return end_step(step, result, result.x, v)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the averages of the residual equation."""
+        """Return the averages of the residual equation, with the mean values of tau and tau².
+
+        Args:
+            problem: the problem that is marched.
+            old: the state at t0.
+            new: the state at t1, before the impact law.
+            dt: size of the step [s].
+        """
         alpha = (new.v - old.v) / dt
         u = old.u + self.theta1 * dt * old.v + 0.5 * self.theta2 * dt**2 * alpha
         f = problem.equations.load_at(old.t + self.theta1 * dt)

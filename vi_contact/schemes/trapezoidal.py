@@ -64,6 +64,11 @@ class Trapezoidal:
         """Return the state with massless nodes in equilibrium.
 
         On a restart, and for a new dt, the state is good as it is.
+
+        Args:
+            problem: the problem that is marched.
+            state: the state to go on from; "force" in its memory says that it has been started.
+            dt: size of the next steps [s]; not read, as no memory depends on it.
         """
         if "force" in state.memory:
             return state
@@ -77,7 +82,14 @@ class Trapezoidal:
         return replace(state, memory={"force": force})
 
     def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
-        """Return the state with the new velocity; forces do not depend on it."""
+        """Return the state with the new velocity; forces do not depend on it.
+
+        Args:
+            problem: the problem that is marched; not read.
+            state: the state before the impact, whose memory stays.
+            v: velocity after the impact (n,) [m/s].
+            dt: size of the next step [s]; not read.
+        """
         return state.with_velocity(v)
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
@@ -87,8 +99,20 @@ class Trapezoidal:
     def step(
         self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
     ) -> StepProblem:
-        """Return the step with b of the module's equations."""
+        """Return the step with b of the module's equations.
+
+        Args:
+            problem: the problem that is marched.
+            state: u [m], v [m/s] and "force" [N] at t0, (n,), or rows (k, n) of several runs.
+            A: 4/dt² M + 2/dt C + K (n, n) [N/m].
+            dt: size of the step [s].
+
+        Returns:
+            The step in x = u1 [m], with b and reactions in newtons.
+        """
         system = problem.equations
+
+        # The memory holds f0 - K u0 - Bᵀr0. What is left of b are products with M and C, and f1.
         b = state.memory["force"] + system.load_at(state.t + dt)
         b += 4.0 / dt**2 * (system.product("M", state.u) + dt * system.product("M", state.v))
         if system.C is not None:
@@ -106,17 +130,33 @@ class Trapezoidal:
         """Return the state with v1 = 2 (u1 - u0)/dt - v0.
 
         Massless unknowns get the mean velocity of the step.
+
+        Args:
+            problem: the problem that is marched.
+            state: the state at t0.
+            step: what ``step`` returned for it.
+            result: its answer, x = u1 (n,) [m] and reactions at the end [N].
+            dt: size of the step [s].
         """
         mean = (result.x - state.u) / dt
         v = replace_massless(problem, 2.0 / dt * (result.x - state.u) - state.v, mean)
         return self._remember_force(problem, end_step(step, result, result.x, v))
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the means of both ends."""
+        """Return the means of both ends.
+
+        Args:
+            problem: the problem that is marched.
+            old: the state at t0.
+            new: the state at t1, before the impact law.
+            dt: size of the step [s].
+        """
         load_at = problem.equations.load_at
         u = 0.5 * (old.u + new.u)
         f = 0.5 * (load_at(old.t) + load_at(new.t))
         balance = balance_means(problem, old, new, dt, u=u, f=f)
+
+        # A first state may have no tangential reactions yet: they count as zero.
         r_t = None
         if new.r_t is not None:
             r_t = 0.5 * (new.r_t if old.r_t is None else old.r_t + new.r_t)

@@ -59,6 +59,15 @@ class ZienkiewiczWoodTaylor(SingleStep):
         """Return the step in x = u1.
 
         b = f/phi + M (u0 + dt v0)/(phi dt)² + C u0/(phi dt) - (1 - phi)/phi K u0.
+
+        Args:
+            problem: the problem that is marched.
+            state: u [m] and v [m/s] at t0, (n,), or rows (k, n) of several runs.
+            A: M/(phi dt)² + C/(phi dt) + K (n, n) [N/m].
+            dt: size of the step [s].
+
+        Returns:
+            The step in x = u1 [m], with b and reactions 1/phi times newtons.
         """
         system = problem.equations
         phi = self.phi
@@ -77,12 +86,27 @@ class ZienkiewiczWoodTaylor(SingleStep):
         result: StepResult,
         dt: float,
     ) -> State:
-        """Return the state with v1 = v0 + ((u1 - u0)/dt - v0)/phi."""
+        """Return the state with v1 = v0 + ((u1 - u0)/dt - v0)/phi.
+
+        Args:
+            problem: the problem that is marched; not read.
+            state: the state at t0.
+            step: what ``step`` returned for it.
+            result: its answer, x = u1 (n,) [m]; the state gets phi times its reactions [N].
+            dt: size of the step [s].
+        """
         v = state.v + ((result.x - state.u) / dt - state.v) / self.phi
         return end_step(step, result, result.x, v)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the averages of the module's equation."""
+        """Return the averages of the module's equation, at t0 + phi dt.
+
+        Args:
+            problem: the problem that is marched.
+            old: the state at t0.
+            new: the state at t1, before the impact law.
+            dt: size of the step [s].
+        """
         u = old.u + self.phi * (new.u - old.u)
         f = self._mean_load(problem, old, dt)
         return balance_means(problem, old, new, dt, u=u, f=f)

@@ -15,7 +15,7 @@ from typing import Any
 from ..core.algebra import EffectiveMatrix, Matrix, SerialMatrix, total
 from ..core.checks import provides
 from ..core.problem import ContactProblem
-from ..core.sizes import small
+from ..core.sizes import is_small_problem
 from ..core.step import PreparedSolver, Solver, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
 from ..kernels.compiler import load_cholmod
@@ -148,7 +148,8 @@ def solver_beside_steps(A: EffectiveMatrix, surface: ContactSurface) -> Solver:
         from .volume import Volume
 
         return Volume()
-    if small(surface.comm, A.matrix.rows, surface.count) or find_spec("petsc4py") is None:
+    is_small = is_small_problem(surface.comm, A.matrix.rows, surface.count)
+    if is_small or find_spec("petsc4py") is None:
         return Condensed()
     from .iterative import Iterative
 

@@ -166,7 +166,7 @@ class PreparedCondensed:
         surface = self._surface
         condensed = condense(self._A, surface, frictional=frictional)
         compliance = surface.everywhere(surface.compliance) / self._scale
-        unknowns_of_a_condition = len(condensed.there) // max(surface.total, 1)
+        unknowns_of_a_condition = len(condensed.movable) // max(surface.total, 1)
         normal = np.arange(surface.total) * unknowns_of_a_condition
         condensed.flexibility[normal, normal] += compliance
         return condensed
@@ -198,7 +198,7 @@ class PreparedCondensed:
         if surface.comm.size > 1:
             bound, guess = surface.everywhere(np.column_stack([bound, guess])).T
             guess = guess > 0.0
-        answer: LCPResult = small.solve(bound - condensed.free(step.b), guess)
+        answer: LCPResult = small.solve(bound - condensed.find_free_motion(step.b), guess)
 
         # Closed conditions on a rigid support go exactly onto their bound.
         x = condensed.answer(answer.r, (answer.r != 0.0) & self._rigid, bound)
@@ -232,7 +232,7 @@ class PreparedCondensed:
             return self.friction.solve_many(many, own, self._rigid)
         if not isinstance(small, PreparedSets):
             return None
-        gaps = many.bound - condensed.free(many.b)
+        gaps = many.bound - condensed.find_free_motion(many.b)
         r, active, counts, failed = small.solve_many(gaps, many.active)
         x = freeze(condensed.answer(r, (r != 0.0) & self._rigid, many.bound))
         return Answers(StepResult(x, r, active, 0, self._name), counts, failed)

@@ -22,7 +22,7 @@ import numpy as np
 
 from ..core.algebra import Array
 from ..core.certificate import Certificate
-from ..core.collective import limit_of
+from ..core.collective import ask_limit
 from ..core.errors import StepFailure
 from ..core.products import freeze
 from ..core.protocols import FrictionLaw
@@ -146,7 +146,7 @@ def kept_reactions(
     # Friction outside the cone, or no farther than s from its edge, is put on its edge: whether it
     # sticks or slips, what is missing then lies in the cone of q.
     law = step.friction_at(surface.tangential_values(answer.x) - step.slip0)
-    limit = limit_of(law, r_n, surface.weights, step.scale)
+    limit = ask_limit(law, r_n, surface.weights, step.scale)
     size = np.linalg.norm(answer.r_t, axis=1)
     onto = np.divide(limit, size, out=np.ones_like(size), where=size > (1.0 - share) * limit)
     return (1.0 - share) * r_n, (1.0 - share) * onto[:, None] * answer.r_t

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..core.algebra import Array, EffectiveMatrix, Mask, largest, max_abs
-from ..core.checks import at, on_all
+from ..core.checks import describe_point, on_all
 from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
 from ..core.step import StepProblem
@@ -85,7 +85,7 @@ def _describe_place(comm: Any, wrong: Mask, points: Array | None) -> str:
     rows = np.flatnonzero(wrong)
     place = ""
     if len(rows) and points is not None:
-        place = at(points[rows[0]])
+        place = describe_point(points[rows[0]])
     of_ranks = comm.bcast(comm.gather((place, bool(wrong.all()))))
     if all(is_whole_rank for _, is_whole_rank in of_ranks):
         return " everywhere"

@@ -8,25 +8,25 @@ import ufl
 from ufl.algorithms import expand_derivatives
 
 from ..core.algebra import Array, Mask, largest, max_abs, total
-from ..core.checks import at, refuse, shown
+from ..core.checks import describe_point, quote, refuse
 from ..core.errors import InputError
 from ..fem import compat
 from ..fem.body.form_checks import refuse_not_linear
 from ..fem.matrices.petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
 from ..fem.matrices.petsc_rows import moved
 from ..fem.mesh.communicators import MpiComm, kept
-from .rounding import OFF, size_of_field
+from .rounding import OFF, measure_field
 
 KINDS = ("functional", "linear form", "bilinear form")
 FORMS = "give a UFL form F(u; v), or (a, L) with a(u, v) bilinear and L(v) linear"
 
 
-def refused(sentence: str) -> InputError:
+def make_error(sentence: str) -> InputError:
     """Return the error of an input of ``vi.solve``."""
     return InputError(f"vi.solve: {sentence}")
 
 
-def split(form: Any, u: Any, J: Any) -> tuple[Any, Any]:
+def split_form(form: Any, u: Any, J: Any) -> tuple[Any, Any]:
     """Return F and its Jacobian.
 
     Args:
@@ -37,12 +37,15 @@ def split(form: Any, u: Any, J: Any) -> tuple[Any, Any]:
     Raises:
         InputError: the form is neither, or not on the space of u.
     """
+    # A form of both rank 2 and 1 in one, a(u, v) - L(v), is the pair (a, L).
     if isinstance(form, ufl.Form) and len(form.arguments()) == 2:
         form = ufl.system(form)
+
+    # F(u; v), whose Jacobian is its derivative.
     if isinstance(form, ufl.Form):
         check_form("F", form, 1, u)
-        if not contains(form, u):
-            raise refused(
+        if not depends_on(form, u):
+            raise make_error(
                 "F does not depend on u: write it with the Function that is solved for, or give "
                 "(a, L)"
             )
@@ -50,35 +53,35 @@ def split(form: Any, u: Any, J: Any) -> tuple[Any, Any]:
         check_form("J", jacobian, 2, u)
         return form, jacobian
     if not isinstance(form, tuple | list) or len(form) != 2 or J is not None:
-        raise refused(f"the form is {shown(form)}, J {shown(J)}; {FORMS}, whose Jacobian is a")
+        raise make_error(f"the form is {quote(form)}, J {quote(J)}; {FORMS}, whose Jacobian is a")
+
+    # (a, L), which is linear: F = a(u, v) - L(v).
     a, L = form
     check_form("a", a, 2, u)
     check_form("L", L, 1, u)
-    if contains(a, u) or contains(L, u):
-        raise refused(
+    if depends_on(a, u) or depends_on(L, u):
+        raise make_error(
             "a or L contains u itself, so that the problem is not linear in it: give F(u; v)"
         )
     return ufl.action(a, u) - L, a
 
 
-def derivatives(energy: Any, u: Any) -> tuple[Any, Any]:
+def differentiate(energy: Any, u: Any) -> tuple[Any, Any]:
     """Return (F, J), the first and second derivative of a functional of u.
 
     Raises:
         InputError: what is no functional of u.
     """
     if not isinstance(energy, ufl.Form) or energy.arguments():
-        what = (
-            f"a form of rank {len(energy.arguments())}"
-            if isinstance(energy, ufl.Form)
-            else shown(energy)
+        raise make_error(
+            f"energy is {_describe_form(energy)}, and a functional is needed; give a UFL form of "
+            "rank 0, such as 0.5 * ufl.inner(ufl.grad(u), ufl.grad(u)) * ufl.dx, or the form "
+            "F(u; v) in its place"
         )
-        raise refused(
-            f"energy is {what}, and a functional is needed; give a UFL form of rank 0, such as "
-            "0.5 * ufl.inner(ufl.grad(u), ufl.grad(u)) * ufl.dx, or the form F(u; v) in its place"
+    if not depends_on(energy, u):
+        raise make_error(
+            "energy does not depend on u: write it with the Function that is solved for"
         )
-    if not contains(energy, u):
-        raise refused("energy does not depend on u: write it with the Function that is solved for")
     F = ufl.derivative(energy, u)
     return F, ufl.derivative(F, u)
 
@@ -93,18 +96,23 @@ def check_form(name: str, form: Any, rank: int, u: Any) -> None:
         u: the Function to solve for.
     """
     if not isinstance(form, ufl.Form) or len(form.arguments()) != rank:
-        what = (
-            f"a form of rank {len(form.arguments())}" if isinstance(form, ufl.Form) else shown(form)
-        )
-        raise refused(f"{name} is {what}, and a {KINDS[rank]} is needed; {FORMS}")
+        given = _describe_form(form)
+        raise make_error(f"{name} is {given}, and a {KINDS[rank]} is needed; {FORMS}")
     space = u.ufl_function_space()
     if any(argument.ufl_function_space() != space for argument in form.arguments()):
-        raise refused(
+        raise make_error(
             f"the test or trial function of {name} is on another space: make it of u.function_space"
         )
 
 
-def contains(form: Any, u: Any) -> bool:
+def _describe_form(value: Any) -> str:
+    """Return in words what was given in the place of a form of another rank."""
+    if isinstance(value, ufl.Form):
+        return f"a form of rank {len(value.arguments())}"
+    return quote(value)
+
+
+def depends_on(form: Any, u: Any) -> bool:
     """Say whether a form depends on u."""
     return any(coefficient is u for coefficient in form.coefficients())
 
@@ -123,7 +131,7 @@ class Problem:
             of ghosts too.
         free: (n,) which owned unknowns no condition holds.
         owned: their number.
-        size: of the field; known after ``bounds``.
+        size: of the field; known after ``read_bounds``.
     """
 
     def __init__(self, form: Any, u: Any, bcs: Sequence[Any], J: Any, energy: Any = None) -> None:
@@ -140,15 +148,15 @@ class Problem:
             InputError: forms or conditions do not fit u.
         """
         if energy is None:
-            F, J = split(form, u, J)
+            F, J = split_form(form, u, J)
         else:
-            F, J = derivatives(energy, u)
+            F, J = differentiate(energy, u)
         space = u.function_space
         self.u = u
         self.comm = MpiComm(kept(space.mesh.comm))
         self.owned = space.dofmap.index_map_bs * space.dofmap.index_map.size_local
         if not isinstance(bcs, list | tuple) or not all(compat.constrains(bc, space) for bc in bcs):
-            raise refused(
+            raise make_error(
                 "bcs is wrong: give a list of dirichletbc objects on the space of u or its "
                 "components"
             )
@@ -170,7 +178,7 @@ class Problem:
         self._F = compat.compile_form(F)
         self._J = compat.compile_form(J)
         self._energy = None if energy is None else compat.compile_form(energy)
-        self.constant = not contains(expand_derivatives(J), u)
+        self.constant = not depends_on(expand_derivatives(J), u)
         self._jacobian: PetscMatrix | None = None
 
     @property
@@ -189,7 +197,10 @@ class Problem:
     def put(self, x: Array, left: float = 0.0) -> None:
         """Write the free unknowns (n,) into u, and the held ones. Collective.
 
-        The held ones lack the share ``left`` of their change.
+        Args:
+            x: (n,) values of the free unknowns.
+            left: the share of their change that the held ones lack, from 0 (at their prescribed
+                values) to 1 (as in the first guess).
         """
         values = self.u.x.array
         values[self._held] = self._values[self._held]
@@ -210,7 +221,7 @@ class Problem:
         """Say whether something is true on every rank. Collective."""
         return not largest(self.comm, not here)
 
-    def places(self) -> Array:
+    def locate_unknowns(self) -> Array:
         """Return (n, 4) where the free unknowns are. Collective.
 
         The columns are coordinates as shares of the body's box, and the component as a share of
@@ -240,22 +251,17 @@ class Problem:
         way = self._prescribed - self._first
         self._values = self._prescribed if share == 1.0 else self._first + share * way
 
-    def residual(self) -> Array:
+    def assemble_residual(self) -> Array:
         """Return F at u. Collective."""
         vector = compat.assemble_vector(self._F)
         values = np.array(vector.array_r[: self.owned])[self.free]
         vector.destroy()
         return values
 
-    def energy(self) -> float:
+    def evaluate_energy(self) -> float:
         """Return the energy at u, infinity where it is no number. Collective."""
         energy = total(self.comm, compat.assemble_scalar(self._energy))
         return energy if np.isfinite(energy) else np.inf
-
-    def jacobian(self) -> PetscMatrix:
-        """Return J at u on the free unknowns; what it returned before is freed. Collective."""
-        J, _ = self.linearise(0.0)
-        return J
 
     def linearise(self, left: float) -> tuple[PetscMatrix, Array]:
         """Return J at u on the free unknowns, and what F of these will gain (n,). Collective.
@@ -263,6 +269,8 @@ class Problem:
         F gains it, to first order, by the share ``left`` of the change of the held ones. The J that
         it returned before is freed.
         """
+        # A constant Jacobian is assembled once. Where held unknowns still move, the columns of the
+        # whole Jacobian that belong to them are needed too, and it is assembled again.
         gain = np.zeros(np.count_nonzero(self.free))
         if self._jacobian is None or left or not self.constant:
             self.close()
@@ -276,7 +284,7 @@ class Problem:
         return self._jacobian, gain
 
     def spread(self, values: Array) -> Any:
-        """Return values of the free unknowns as a Function, zero elsewhere. Collective."""
+        """Return values (n,) of the free unknowns as a Function, zero elsewhere. Collective."""
         function = compat.function(self.u.function_space)
         function.x.array[: self.owned][self.free] = values
         function.x.scatter_forward()
@@ -288,7 +296,7 @@ class Problem:
             self._jacobian.mat.destroy()
         self._jacobian = None
 
-    def bounds(self, lower: Any, upper: Any) -> tuple[Array, Array]:
+    def read_bounds(self, lower: Any, upper: Any) -> tuple[Array, Array]:
         """Return (lower, upper) of the free unknowns. Collective.
 
         What misses by rounding (``rounding``) contradicts nothing: a prescribed value that is
@@ -298,12 +306,16 @@ class Problem:
         Raises:
             InputError: on all ranks, where bounds contradict each other or the conditions.
         """
-        low = self._bound("lower", lower, -np.inf)
-        high = self._bound("upper", upper, np.inf)
+        low = self._read_bound("lower", lower, -np.inf)
+        high = self._read_bound("upper", upper, np.inf)
+        # u as it would be with the conditions: what bounds are compared with, and what tells the
+        # size of the field that rounding is relative to.
         u = np.where(self._held, self._values, self.given)[: self.owned]
         space = self.u.function_space
-        self.size = size_of_field(np.nan_to_num(u, nan=np.inf), low, high, self.comm)
+        self.size = measure_field(np.nan_to_num(u, nan=np.inf), low, high, self.comm)
         off = OFF * self.size
+
+        # Masks of what is wrong at unknowns of this rank; the first defect of any rank is told.
         defects = (
             (~np.isfinite(u), "the first guess or bcs are NaN or infinite: correct them"),
             (
@@ -323,25 +335,26 @@ class Problem:
 
         def describe(i: int, words: str) -> str:
             node, component = divmod(i, space.dofmap.index_map_bs)
-            where = f"component {component} at {at(space.tabulate_dof_coordinates()[node])}"
+            place = describe_point(space.tabulate_dof_coordinates()[node])
+            where = f"component {component} at {place}"
             return f"vi.solve: {where}, where u is {u[i]:g} in [{low[i]:g}, {high[i]:g}]: {words}"
 
-        refuse(
-            (describe(int(np.argmax(wrong)), words) for wrong, words in defects if np.any(wrong)),
-            self.comm,
-        )
+        sentences = [
+            describe(int(np.argmax(wrong)), words) for wrong, words in defects if np.any(wrong)
+        ]
+        refuse(sentences, self.comm)
         return low[self.free], np.maximum(low, high)[self.free]
 
     def moves(self, low: Array, high: Array) -> bool:
         """Say whether conditions or bounds change the first guess by more than rounding.
 
-        It is asked after ``bounds``. Collective.
+        It is asked after ``read_bounds``. Collective.
         """
         x = self.given[: self.owned][self.free]
         most = max(max_abs(self.change), max_abs(x - np.clip(x, low, high)))
         return largest(self.comm, most) > OFF * self.size
 
-    def _bound(self, name: str, given: Any, none: float) -> Array:
+    def _read_bound(self, name: str, given: Any, none: float) -> Array:
         """Return a bound at the owned unknowns.
 
         Args:
@@ -360,13 +373,13 @@ class Problem:
             number = np.asarray(none if given is None else given, dtype=float)
             return np.tile(np.broadcast_to(number, (width,)), self.owned // width)
         except (TypeError, ValueError):
-            raise refused(
-                f"{name} is {shown(given)}; give a Function on u.function_space itself, a number "
+            raise make_error(
+                f"{name} is {quote(given)}; give a Function on u.function_space itself, a number "
                 f"(or {width}, one for a component), or None"
             ) from None
 
 
-def common_part(bound: Any) -> Any:
+def take_common_part(bound: Any) -> Any:
     """Return what of a bound all ranks must give alike: numbers, and the value of a Constant.
 
     A Function is compared by its kind alone.

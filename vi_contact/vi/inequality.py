@@ -1,10 +1,19 @@
 """Find u between bounds with F(u; v - u) >= 0 for all v with lower <= v <= upper.
 
-The bounds hold at the points of a Function's space.
+The bounds hold at the points of a Function's space. With F the vector of F(u; phi_i) this says of
+every unknown i that no condition holds
 
-Newton's method (N. H. Josephy, 1979) solves F(u_k) + J(u_k) (u - u_k) in the place of F
-(``solve_linear``) and goes towards the answer as far as makes the natural residual u - mid(lower, u
-- F/J_ii, upper) smaller by a part of what the slope promises. A linear problem takes one step.
+    F_i >= 0 where u_i = lower_i,    F_i <= 0 where u_i = upper_i,    F_i = 0 between
+
+``solve`` is the door for users. It reads what they give (``forms``), and takes one of two ways:
+
+- a form F(u; v), with any Jacobian: Newton's method for variational inequalities (``newton``),
+  whose linear problems are those of the volume route (``linear_steps``). It makes the natural
+  residual u - mid(lower, u - F/J_ii, upper) smaller in each step; a linear problem takes one step.
+- an energy, whose derivative F is: a descent with a trust region (``minimum``), which also leaves
+  maxima and saddles.
+
+What either has found is judged by one certificate (``judged``).
 """
 
 import logging
@@ -14,7 +23,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..core.certificate import Certificate
-from ..core.checks import instance, shown, whole
+from ..core.checks import instance, quote, whole
 from ..core.collective import agree
 from ..core.errors import StepFailure
 from ..fem import compat
@@ -22,7 +31,7 @@ from ..fem.body.form_checks import refuse_complex
 from ..fem.mesh.communicators import MpiComm, kept
 from ..solvers.volume.options import OptionLayers
 from ..solvers.volume.route import Method, TaoTron, Volume
-from .forms import Problem, common_part, refused
+from .forms import Problem, make_error, take_common_part
 from .judged import Judged
 from .linear_steps import is_symmetric
 from .minimum import minimise
@@ -132,8 +141,8 @@ def solve(
     refuse_unknowns(u)
     refuse_choices(form, energy, J, method)
     choices = {
-        "lower": common_part(lower),
-        "upper": common_part(upper),
+        "lower": take_common_part(lower),
+        "upper": take_common_part(upper),
         "J": J is None,
         "energy": energy is None,
         "method": method,
@@ -147,15 +156,19 @@ def solve(
     options = {} if petsc_options is None else petsc_options
     settings = Volume(method or TaoTron(), options, prefix, tolerance)
 
+    # Read forms and bounds; from here on u changes.
     problem = Problem(form, u, bcs, J, energy)
-    low, high = problem.bounds(lower, upper)
+    low, high = problem.read_bounds(lower, upper)
     ready = time.process_time()
-    layers = OptionLayers(prefix, preconditioner(problem.comm.size), settings.petsc_options)
+
+    # Newton's method for a form, a descent for an energy.
+    layers = OptionLayers(prefix, choose_preconditioner(problem.comm.size), settings.petsc_options)
     is_hill = False
     try:
         if energy is None:
             methods = () if method is None else (method,)
             progress = solve_in_parts(problem, low, high, settings, methods, limit)
+            # A Jacobian with negative curvature explains a failure, and casts doubt on an answer.
             if progress.failure or progress.doubted:
                 is_hill = curves_down(progress, layers)
         else:
@@ -163,23 +176,39 @@ def solve(
     finally:
         problem.close()
 
-    best = progress.best
     steps = "Newton steps" if energy is None else "steps downhill"
-    reason = f"the certificate is {best.certificate.worst:.1e} after {progress.steps} {steps}"
+    worst = progress.best.certificate.worst
+    reason = f"the certificate is {worst:.1e} after {progress.steps} {steps}"
     if progress.failure:
         cause = NEGATIVE if is_hill else progress.failure
         raise give_up(problem, progress, f"vi.solve: {reason}, above {tolerance:g}: {cause}")
-    problem.put(best.x)
     if is_hill:
         reason += f", {HILL}"
         if problem.comm.rank == 0:
             log.warning("vi.solve: %s", HILL)
     if energy is not None:
         reason += ", at a local minimum: no direction of negative curvature is found"
+    return finish(problem, progress, reason, start=start, ready=ready)
+
+
+def finish(
+    problem: Problem, progress: Progress, reason: str, *, start: float, ready: float
+) -> Result:
+    """Write the best values into u, and return the answer. Collective.
+
+    Args:
+        problem: with u.
+        progress: of the method, which has found the answer.
+        reason: why it ended.
+        start: processor time [s] when ``solve`` was called.
+        ready: processor time [s] when forms and bounds had been read.
+    """
+    best = progress.best
+    problem.put(best.x)
     on_lower, on_upper = (problem.count(multiplier != 0.0) for multiplier in best.push)
     lambda_lower, lambda_upper = (problem.spread(multiplier) for multiplier in best.push)
     return Result(
-        u=u,
+        u=problem.u,
         lambda_lower=lambda_lower,
         lambda_upper=lambda_upper,
         active=(on_lower, on_upper),
@@ -196,7 +225,7 @@ def refuse_unknowns(u: Any) -> None:
     """Raise InputError unless u is a Function whose unknowns are values of one field at points."""
     instance("vi.solve", "u", u, compat.fem.Function, "give the DOLFINx Function to solve for")
     if not compat.nodal(u.function_space):
-        raise refused(
+        raise make_error(
             "the unknowns of u are not values of one field at points: take Lagrange or DG0, not "
             "mixed"
         )
@@ -212,24 +241,24 @@ def refuse_choices(form: Any, energy: Any, J: Any, method: Any) -> None:
         method: for linear steps, of a form only.
     """
     if form is None and energy is None:
-        raise refused(
+        raise make_error(
             "there is nothing to solve: give the form F(u; v), or energy=, a functional of u"
         )
     if form is not None and energy is not None:
-        raise refused(
+        raise make_error(
             "both a form and energy= are given: give one of them, as the form is the "
             "derivative of the energy"
         )
     if energy is not None and J is not None:
-        raise refused("J is given beside energy=, whose second derivative is J: leave J out")
+        raise make_error("J is given beside energy=, whose second derivative is J: leave J out")
     if energy is not None and method is not None:
-        raise refused(
-            f"method is {shown(method)}, which solves the linear steps of a form; leave it "
+        raise make_error(
+            f"method is {quote(method)}, which solves the linear steps of a form; leave it "
             "out with energy="
         )
 
 
-def preconditioner(ranks: int) -> Mapping[str, object | None]:
+def choose_preconditioner(ranks: int) -> Mapping[str, object | None]:
     """Return the options that come before the user's, for conjugate gradients on so many ranks."""
     return {"pc_type": "icc"} if ranks == 1 else {"pc_type": "bjacobi", "sub_pc_type": "icc"}
 

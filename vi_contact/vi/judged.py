@@ -1,6 +1,10 @@
 """Judge a u by its certificate, and measure how far it is from the answer.
 
-F is linearised about u; the measure is one number.
+F is linearised about u: ``A`` is its Jacobian J, and b such that F + J (x_new - x) = A x_new - b.
+Where F_i pushes an unknown against a bound, F_i is the *multiplier* of this bound; everywhere else
+it has to vanish. So F = push_lower - push_upper at an answer, and each push is >= 0 and zero off
+its bound. The certificate tells how far that is from being true, the natural residual
+r = x - mid(lower, x - F/J_ii, upper) puts it into one number for the line search.
 """
 
 import numpy as np
@@ -48,11 +52,12 @@ class Judged:
         self.upper = upper
         self.left = left
         self.x = problem.x
-        residual = problem.residual()
+        residual = problem.assemble_residual()
         self.A, self.gain = problem.linearise(left)
         self.F = residual + self.gain if left else residual
 
-        # The linear problem, and the largest sizes on any rank of what it is made of.
+        # The linear problem, and the largest sizes on any rank of what it is made of: by one
+        # reduction. Infinity stands for what is no number.
         Ax = self.A @ self.x
         diagonal = np.abs(self.A.diagonal())
         self.b = Ax - self.F
@@ -62,6 +67,9 @@ class Judged:
         x_max, b_max, Ax_max, F_max, most = sizes.tolist()
         self.diagonal = np.maximum(diagonal, DIAGONAL * most)
         least = 0.0 if problem.constant else SMALL * problem.size
+
+        # References of the certificate: displacements [of u] and forces [of F] that residuals are
+        # compared with; one where all is zero.
         x_ref = max(x_max, least) or 1.0
         r_ref = max(b_max, F_max, most * least) or 1.0
 
@@ -89,15 +97,15 @@ class Judged:
             worst = np.full(len(worst), np.inf)
         self.certificate = Certificate(*worst.tolist())
 
-    def natural(self, x: Array, F: Array) -> float:
+    def measure_natural_residual(self, x: Array, F: Array) -> float:
         """Return the size sum J_ii r² of the natural residual r. Collective.
 
         r = x - mid(lower, x - F / J_ii, upper), with the J_ii of this u, is zero at the answer
         only. The size is infinite where F is not a number.
 
         Args:
-            x: (n,) another x,
-            F: (n,) and F there.
+            x: (n,) another x.
+            F: (n,) the F there.
         """
         with np.errstate(over="ignore", invalid="ignore"):
             r = x - np.clip(x - F / self.diagonal, self.lower, self.upper)
@@ -108,10 +116,10 @@ class Judged:
         """Write another x into u, and return the F there. Collective.
 
         Args:
-            x: (n,).
+            x: (n,) values of the free unknowns.
             left: share of the change of held unknowns that is then still to come. F comes with what
                 it will gain by that.
         """
         self.problem.put(x, left)
-        F = self.problem.residual()
+        F = self.problem.assemble_residual()
         return F + (left / self.left) * self.gain if left else F

@@ -1,6 +1,9 @@
-"""Solve a linear problem A x - b between bounds, lower <= x <= upper.
+"""Solve a linear problem A x - b between bounds: one step of Newton's method.
 
-The methods are those of the volume route.
+    (A x - b)_i >= 0 where x_i = lower_i,    <= 0 where x_i = upper_i,    = 0 between
+
+``LinearSteps`` asks the methods of the volume route, one after another. ``find_reduced_step`` needs
+none of them: it takes the bounds that act as they are, and solves for the other unknowns.
 """
 
 from collections.abc import Sequence
@@ -10,20 +13,20 @@ import numpy as np
 
 from ..core.algebra import Array, EffectiveMatrix, total
 from ..core.errors import InputError, StepFailure
-from ..core.matrix_checks import SYMMETRIC, asymmetry
+from ..core.matrix_checks import SYMMETRIC, measure_asymmetry
 from ..core.step import StepProblem
 from ..core.surfaces import empty_surface
 from ..fem.matrices.petsc_algebra import PetscAlgebra, PetscMatrix, UnsymmetricAlgebra
 from ..fem.mesh.communicators import MpiComm
 from ..solvers.volume.route import Method, ReducedNewton, SemismoothNewton, TaoTron, Volume
-from .forms import refused
+from .forms import make_error
 from .judged import Judged
 
 
 def is_symmetric(A: PetscMatrix, comm: MpiComm) -> bool:
     """Say whether A is symmetric to round-off. Collective."""
     numbers = PetscAlgebra(comm.mpi).first(A.rows) + np.arange(A.rows)
-    return asymmetry(A, comm, numbers) <= SYMMETRIC
+    return measure_asymmetry(A, comm, numbers) <= SYMMETRIC
 
 
 class LinearSteps:
@@ -50,16 +53,22 @@ class LinearSteps:
         self.failed: set[str] = set()
         self.helps = True
 
-    def methods(self, symmetric: bool) -> list[Method]:
-        """Return the methods to try, in this order; InputError for one that does not suit A."""
+    def choose_methods(self, symmetric: bool) -> list[Method]:
+        """Return the methods to try, in this order.
+
+        Raises:
+            InputError: the user's method does not suit A.
+        """
         if self.given and isinstance(self.given[0], TaoTron) and not symmetric:
-            raise refused(
+            raise make_error(
                 f"{self.given[0]} minimises, and the form is not symmetric, so there is nothing to "
                 "minimise: leave method out, or take ReducedNewton() or SemismoothNewton()"
             )
-        suited: list[Method] = (
-            [TaoTron(), ReducedNewton()] if symmetric else [ReducedNewton(), SemismoothNewton()]
-        )
+        suited: list[Method] = [ReducedNewton(), SemismoothNewton()]
+        if symmetric:
+            suited = [TaoTron(), ReducedNewton()]
+
+        # The sort is stable: those that have failed go to the end, and all others stay in order.
         return sorted(self.given or suited, key=lambda method: type(method).__name__ in self.failed)
 
     def solve(
@@ -68,11 +77,11 @@ class LinearSteps:
         """Return the answer of the first method that finds it. Collective.
 
         Args:
-            A: the matrix.
-            b: (n,).
-            lower: (n,) bounds from below.
-            upper: (n,) bounds from above.
-            start: (n,) where to begin.
+            A: the matrix (n, n).
+            b: (n,) right-hand side, in the unit of F.
+            lower: (n,) bounds of x from below, -inf for none.
+            upper: (n,) bounds of x from above, inf for none.
+            start: (n,) the x where to begin.
 
         Returns:
             x (n,), the iterations, and the name of the method.
@@ -82,10 +91,10 @@ class LinearSteps:
         """
         comm = self.comm
         symmetric = is_symmetric(A, comm)
-        methods = self.methods(symmetric)
+        methods = self.choose_methods(symmetric)
 
-        # A start from nothing: along b as far as energy and bounds say, which tells the solvers the
-        # size of x.
+        # A start from nothing: along b to the minimum of ½ x·A x - b·x, between the bounds. It
+        # tells the solvers the size of x.
         bAb = total(comm, b @ (A @ b))
         bb = total(comm, b @ b)
         has_start = total(comm, np.any(start)) > 0.0
@@ -107,6 +116,7 @@ class LinearSteps:
         matrix = EffectiveMatrix(A, algebra)
         step = StepProblem(matrix, b, upper, surface, 1.0, start, none, 0.0, 0, lower=lower)
 
+        # The first method that finds an answer has it.
         failures: list[str] = []
         for method in methods:
             solver = replace(self.settings, method=method).prepare(matrix, surface, 1.0)
@@ -124,7 +134,7 @@ class LinearSteps:
         raise StepFailure("; ".join(failures))
 
 
-def reduced_step(point: Judged) -> Array:
+def find_reduced_step(point: Judged) -> Array:
     """Return where one step of Newton's method for the natural residual leads.
 
     Where a bound holds an unknown in that residual, lower + F/J_ii >= x or x >= upper + F/J_ii, the
@@ -141,7 +151,8 @@ def reduced_step(point: Judged) -> Array:
     F = point.F
     comm = point.problem.comm
 
-    # Unknowns that a bound holds go to it, and the others are solved for.
+    # A step of Jacobi's method would lead to ``aim``. Unknowns that it would lead to a bound, or
+    # beyond, are held by this bound: they go to it, and the others are solved for.
     aim = x - F / point.diagonal
     held = (aim <= point.lower) | (aim >= point.upper)
     step = np.where(held, np.clip(aim, point.lower, point.upper) - x, 0.0)

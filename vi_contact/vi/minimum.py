@@ -75,7 +75,7 @@ def carry_conditions(progress: Progress, layers: OptionLayers) -> None:
     while length > SHORTEST:
         left = point.left * (1.0 - length)
         problem.put(point.x + length * step, left)
-        if np.isfinite(problem.energy()):
+        if np.isfinite(problem.evaluate_energy()):
             # All the way the bounds hold exactly; on the way the point may still be outside.
             if length == 1.0:
                 problem.put(np.clip(problem.x, point.lower, point.upper))
@@ -102,7 +102,7 @@ def descend(progress: Progress, tolerance: float, limit: int, layers: OptionLaye
         layers: options of the preconditioner.
     """
     point = progress.best
-    energy = point.problem.energy()
+    energy = point.problem.evaluate_energy()
     if point.broken or not np.isfinite(energy):
         progress.failure = NOT_A_NUMBER
     else:
@@ -124,25 +124,23 @@ def _follow(
     point = progress.best
     problem = point.problem
     model = Model(point, layers)
-    first = FIRST_RADIUS * model.jacobi_step()
+    first = FIRST_RADIUS * model.measure_jacobi_step()
     radius = first
     # the length of a step along negative curvature, as a share of the first one that is tried
     share = 1.0
     while True:
-        # A step: where first-order conditions hold, a maximum or a saddle is left along a direction
-        # of negative curvature; elsewhere to the minimum of the model within the region.
         is_stationary = point.certificate.worst <= tolerance
-        step, iterations = model.downward(share) if is_stationary else model.minimise(radius)
+        step, iterations = _find_step(model, radius, share if is_stationary else None)
         progress.inner += iterations
         if step is None:
             break
         if is_stationary:
-            first = model.length(step)
+            first = model.measure_length(step)
             radius = first
         if progress.steps >= limit or radius > UNBOUNDED * first:
             progress.failure = TOO_FEW if progress.steps >= limit else NO_DESCENT
             break
-        length = model.length(step)
+        length = model.measure_length(step)
         trial, ratio = _try_step(model, point, step, energy)
         radius = _trust(radius, length, ratio)
 
@@ -175,27 +173,43 @@ def _follow(
     model.close()
 
 
+def _find_step(model: Model, radius: float, share: float | None) -> tuple[Array | None, int]:
+    """Return a step (n,), or None where there is none, and its iterations. Collective.
+
+    Where first-order conditions hold, a maximum or a saddle is left along a direction of negative
+    curvature; elsewhere the step goes to the minimum of the model within the region.
+
+    Args:
+        model: the quadratic model.
+        radius: that of the region, in the norm of the model.
+        share: of the first length that is tried along negative curvature; None where first-order
+            conditions do not hold yet.
+    """
+    return model.minimise(radius) if share is None else model.find_step_downhill(share)
+
+
 def _try_step(model: Model, point: Judged, step: Array, energy: float) -> tuple[float, float]:
     """Write the point after a step into u. Collective.
 
     Args:
         model: the quadratic model.
         point: where it was made.
-        step: (n,).
-        energy: of the point.
+        step: (n,) change of the free unknowns.
+        energy: that of the point.
 
     Returns:
         The energy there, and what was gained over what the model promises; -inf where it promises
         nothing.
     """
     problem = point.problem
-    promised = -model.value(step)
+    # The ratio of what was gained to what the model promised tells how far to trust the model.
+    promised = -model.evaluate(step)
     problem.put(np.clip(point.x + step, point.lower, point.upper))
-    trial = problem.energy()
+    trial = problem.evaluate_energy()
     gained = energy - trial
     # Differences of energies lose digits that the work of the forces has.
     if np.isfinite(trial) and abs(promised) <= DIGITS * max(abs(energy), abs(trial)):
-        gained = -0.5 * problem.dot(point.F + problem.residual(), step)
+        gained = -0.5 * problem.dot(point.F + problem.assemble_residual(), step)
     return trial, gained / promised if promised > 0.0 else -np.inf
 
 
@@ -204,8 +218,8 @@ def _trust(radius: float, length: float, ratio: float) -> float:
 
     Args:
         radius: the present one.
-        length: of the step.
-        ratio: what it gained over what was promised.
+        length: that of the step, in the same norm.
+        ratio: what it gained over what was promised, a pure number.
     """
     if ratio < POOR:
         return SHRINK * length

@@ -62,20 +62,20 @@ class Model:
             self._block.precondition.close()
         self._block = None
 
-    def value(self, s: Array) -> float:
+    def evaluate(self, s: Array) -> float:
         """Return q(s). Collective."""
         return self.problem.dot(s, self.F + 0.5 * (self.J @ s))
 
-    def length(self, s: Array) -> float:
+    def measure_length(self, s: Array) -> float:
         """Return |s|. Collective."""
         return float(np.sqrt(self.problem.dot(s, self.diagonal * s)))
 
-    def jacobi_step(self) -> float:
+    def measure_jacobi_step(self) -> float:
         """Return |s| of one step of Jacobi's method between the bounds: a first measure of lengths.
 
         Collective.
         """
-        return self.length(self._clip(-self.F / self.diagonal))
+        return self.measure_length(self._clip(-self.F / self.diagonal))
 
     def minimise(self, radius: float) -> tuple[Array, int]:
         """Return a step s, and the iterations of conjugate gradients that it took. Collective.
@@ -107,7 +107,7 @@ class Model:
                 break  # the edge of the region is reached, or no further bound
         return s, count
 
-    def downward(self, share: float) -> tuple[Array | None, int]:
+    def find_step_downhill(self, share: float) -> tuple[Array | None, int]:
         """Find a step along a direction of negative curvature. Collective.
 
         The direction is on the unknowns that no bound holds, and the step on the side where the
@@ -126,20 +126,20 @@ class Model:
 
         # The length.
         self.problem.put(self.x)
-        energy = abs(self.problem.energy())
+        energy = abs(self.problem.evaluate_energy())
         curvature = -self.problem.dot(direction, self.J @ direction)
-        length = np.sqrt(2.0 * PART * energy / curvature) * self.length(direction)
+        length = np.sqrt(2.0 * PART * energy / curvature) * self.measure_length(direction)
         # an energy of zero tells nothing: the size of the field, or of one where there is none
         if length == 0.0:
-            length = self.length(np.full_like(self.x, self.problem.size or 1.0))
-        s = direction * (share * length / self.length(direction))
+            length = self.measure_length(np.full_like(self.x, self.problem.size or 1.0))
+        s = direction * (share * length / self.measure_length(direction))
 
         # The side. Of two that differ by rounding the first is taken, whatever the number of ranks.
         sides = [self._clip(s), self._clip(-s)]
         energies = []
         for side in sides:
             self.problem.put(self.x + side)
-            energies.append(self.problem.energy())
+            energies.append(self.problem.evaluate_energy())
         is_second_lower = energies[0] > energies[1] + EVEN * abs(energies[1])
         return sides[1] if is_second_lower else sides[0], iterations
 
@@ -171,13 +171,13 @@ class Model:
         """
         start = self._clip(np.zeros_like(self.x))  # zero, unless x lies outside the bounds
         direction = -(self.F + self.J @ start) / self.diagonal
-        base = self.value(start)
+        base = self.evaluate(start)
         alpha = 1.0
         for _ in range(CAUCHY_HALVINGS):
             s = self._clip(start + alpha * direction)
             slope = -self.problem.dot(s - start, self.diagonal * direction)
-            is_near = self.length(s) <= max(radius, self.length(start))
-            if is_near and self.value(s) - base <= DESCENT * slope:
+            is_near = self.measure_length(s) <= max(radius, self.measure_length(start))
+            if is_near and self.evaluate(s) - base <= DESCENT * slope:
                 return s
             alpha *= 0.5
         return start
@@ -193,12 +193,12 @@ class Model:
         Returns:
             The step, None where no beta = 1, 1/2, 1/4, … makes q smaller.
         """
-        base = self.value(s)
+        base = self.evaluate(s)
         beta = 1.0
         for _ in range(SEARCH_HALVINGS):
             trial = self._clip(s + beta * w)
             slope = self.problem.dot(residual, trial - s)
-            if slope < 0.0 and self.value(trial) - base <= DESCENT * slope:
+            if slope < 0.0 and self.evaluate(trial) - base <= DESCENT * slope:
                 return trial
             beta *= 0.5
         return None
@@ -239,6 +239,9 @@ class Model:
         s_free = s[free]
         held_square = dot(s[~free], self.diagonal[~free] * s[~free])
         w = np.zeros_like(s_free)
+
+        # r is the residual -residual - J w, z = P⁻¹ r with the preconditioner P, d the direction
+        # of search, and rz = r·z the square of the residual that is to fall.
         r = -residual[free]
         z = precondition(r)
         d = z.copy()
@@ -292,7 +295,10 @@ class Model:
         free = self._off_bounds(np.zeros_like(self.x)) & (push_up == 0.0) & (push_down == 0.0)
         if not self.problem.count(free):
             return None, 0
-        load = self.diagonal * _uneven(self.problem.places())
+
+        # Conjugate gradients for J w = load, of which only the directions d are wanted: they end at
+        # the first one along which the curvature is below zero by more than rounding.
+        load = self.diagonal * _uneven(self.problem.locate_unknowns())
         _, block, precondition = self._block_on(free)
         dot = self.problem.dot
         r = load[free]
@@ -362,6 +368,7 @@ def _set_up(pc: Any, _layers: OptionLayers) -> None:
 def _uneven(places: Array) -> Array:
     """Return values between 1/2 and 3/2 at points (n, 4) of the unit box.
 
-    The last coordinate is that of the component. The values are smooth, and of no symmetry.
+    The last coordinate is that of the component. The values are smooth, and of no symmetry: a load
+    with a symmetry of the body would miss directions of negative curvature that lack it.
     """
     return np.asarray(1.0 + 0.5 * np.sin(1.0 + places @ (GOLDEN * np.array([4.0, 3.0, 2.0, 1.0]))))

@@ -21,7 +21,7 @@ from ..core.errors import StepFailure
 from ..solvers.volume.route import Method, Volume
 from .forms import Problem
 from .judged import Judged
-from .linear_steps import LinearSteps, reduced_step
+from .linear_steps import LinearSteps, find_reduced_step
 
 log = logging.getLogger(__name__)
 
@@ -85,14 +85,16 @@ def begin(problem: Problem, lower: Array, upper: Array, *, carry: bool = True) -
         carry: True to carry small changes too; False to write into u at once what leaves forces
             hardly larger than the linear step that carries it would.
     """
+    # Try the u that was given first, with the change of the conditions (all of it, 1.0) still to
+    # come. To carry it is worth a step only if it would leave larger forces when written at once.
     given = problem.x
     if not problem.constant and problem.moves(lower, upper):
         problem.put(given, 1.0)
         point = Judged(problem, lower, upper, 1.0)
         if not point.broken:
             changed = np.clip(given, lower, upper)
-            forces = point.natural(changed, point.put(changed, 0.0))
-            if carry or forces > SMALL_CHANGE * point.natural(point.x, point.F):
+            forces = point.measure_natural_residual(changed, point.put(changed, 0.0))
+            if carry or forces > SMALL_CHANGE * point.measure_natural_residual(point.x, point.F):
                 problem.put(given, 1.0)
                 return point
     problem.put(np.clip(given, lower, upper))
@@ -121,7 +123,7 @@ def solve_in_parts(
         limit: number of steps, at most.
     """
     moves = not problem.constant and problem.moves(lower, upper)
-    whole = newton(problem, lower, upper, settings, methods, limit, carry=False)
+    whole = run_newton(problem, lower, upper, settings, methods, limit, carry=False)
     if not whole.failure or not moves:
         return whole
 
@@ -135,7 +137,7 @@ def solve_in_parts(
     while part >= SMALLEST_PART:
         before = np.array(problem.u.x.array)
         problem.aim(reached + part)
-        progress = newton(problem, lower, upper, settings, methods, min(limit, STEPS_OF_A_PART))
+        progress = run_newton(problem, lower, upper, settings, methods, min(limit, STEPS_OF_A_PART))
         steps += progress.steps
         inner += progress.inner
         if progress.failure:
@@ -152,7 +154,7 @@ def solve_in_parts(
     return whole
 
 
-def newton(
+def run_newton(
     problem: Problem,
     lower: Array,
     upper: Array,
@@ -179,6 +181,9 @@ def newton(
     progress = Progress(point, at_once=point.left == 0.0)
     steps = LinearSteps(settings, methods, problem.comm)
     limit = min(limit, REFINEMENTS) if problem.constant else limit
+
+    # ``point`` is the present u, ``best`` the one with the smallest certificate; while conditions
+    # are still to be met (``left``) no certificate is finite, and the last point is the best.
     while progress.best.certificate.worst > settings.tolerance:
         if point.broken:
             progress.failure = NO_STEP if progress.steps else NOT_A_NUMBER
@@ -265,7 +270,7 @@ def take_reduced_step(progress: Progress, point: Judged, steps: LinearSteps) -> 
     """
     progress.failure = NO_STEP
     try:
-        left = advance(point, reduced_step(point))
+        left = advance(point, find_reduced_step(point))
     except StepFailure as failure:
         log.debug("vi.solve: %s", failure)
         return None
@@ -289,12 +294,15 @@ def advance(point: Judged, target: Array) -> float | None:
     # rounding.
     lower = np.minimum(point.lower, np.minimum(point.x, target))
     upper = np.maximum(point.upper, np.maximum(point.x, target))
+
+    # Armijo's rule, by halvings. To first order r becomes (1 - length) r, and the size of the
+    # natural residual, sum J_ii r², falls by 2 length of itself: a part of that must come true.
     step = target - point.x
-    natural = point.natural(point.x, point.F)
+    natural = point.measure_natural_residual(point.x, point.F)
     for length in 0.5 ** np.arange(HALVINGS):
         x = np.clip(point.x + length * step, lower, upper)
         left = point.left * (1.0 - length)
         F = point.put(x, left)
-        if point.natural(x, F) <= (1.0 - 2.0 * ARMIJO * length) * natural:
+        if point.measure_natural_residual(x, F) <= (1.0 - 2.0 * ARMIJO * length) * natural:
             return float(left)
     return None

@@ -15,7 +15,7 @@ OFF = 1e-12  # of the field's size
 FAR = 1e4
 
 
-def size_of_field(values: Array, lower: Array, upper: Array, comm: Comm) -> float:
+def measure_field(values: Array, lower: Array, upper: Array, comm: Comm) -> float:
     """Return the largest finite number among the values of a field and its bounds. Collective.
 
     Users write 1e7 or 1e20 where there is no bound. Such walls say nothing of the size of the

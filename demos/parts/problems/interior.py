@@ -23,7 +23,7 @@ from vi_contact.bem.poincare_steklov import BoundaryMotion, PoincareSteklov
 from vi_contact.bem.quadrature import integration_matrix
 from vi_contact.bem.rules import pieces, place_rule, roots, smooth_rule
 from vi_contact.core.algebra import Array
-from vi_contact.core.checks import array, instance, integers, shape_of
+from vi_contact.core.checks import array, find_shape, instance, integers
 from vi_contact.core.errors import InputError
 
 ORDER = 8  # points a piece
@@ -49,7 +49,7 @@ def interior_displacement(
     instance(owner, "motion", motion, BoundaryMotion, "give the answer of BoundaryProblem.solve()")
     mesh, blocks = operator.mesh, operator.blocks
     x = array(
-        owner, "points", points, (2,) if shape_of(points) == (2,) else (None, 2), unit="m"
+        owner, "points", points, (2,) if find_shape(points) == (2,) else (None, 2), unit="m"
     ).reshape(-1, 2)
     _check_inside(mesh, x)
     wanted = (

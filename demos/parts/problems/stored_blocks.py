@@ -33,7 +33,7 @@ def stored_blocks(
     target = checks.path(owner, "path", path)
     if not target.parent.is_dir():
         raise InputError(
-            f"{owner}: there is no folder {checks.shown(str(target.parent))}; make it first"
+            f"{owner}: there is no folder {checks.quote(str(target.parent))}; make it first"
         )
     if target.exists():
         check_body(mesh, material, Orders())
@@ -58,7 +58,7 @@ def stored_blocks(
         hdf5_atomically(target, fill)
     except OSError as error:
         raise InputError(
-            f"{owner}: {target.name} cannot be written ({checks.shown(str(error))}); give a file "
+            f"{owner}: {target.name} cannot be written ({checks.quote(str(error))}); give a file "
             "in a folder with room that may be written to"
         ) from error
     return blocks
@@ -88,7 +88,7 @@ def _read(
     except (KeyError, ValueError, TypeError, OSError, AttributeError) as error:
         raise InputError(
             f"{path.name}: no HDF5 file of boundary element blocks, or a damaged one "
-            f"({checks.shown(str(error))}); remove it, and it is made again"
+            f"({checks.quote(str(error))}); remove it, and it is made again"
         ) from error
     return EnergeticBlocks(mesh, material.c_p, material.c_s, dt, **found)
 
@@ -97,7 +97,7 @@ def _differences(
     file: Any, mesh: BoundaryMesh, material: LinearElastic, dt: float, steps: int
 ) -> list[str]:
     if file.attrs["format"] != FORMAT:
-        return [f"in the format {checks.shown(file.attrs['format'])}, here '{FORMAT}'"]
+        return [f"in the format {checks.quote(file.attrs['format'])}, here '{FORMAT}'"]
     points = file["points"][:]
     if points.shape != mesh.points.shape:
         return [f"{len(points)} elements, here {len(mesh)}"]

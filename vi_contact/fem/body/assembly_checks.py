@@ -12,7 +12,7 @@ import ufl
 from dolfinx.mesh import Mesh
 
 from ...core.algebra import total
-from ...core.checks import check_word, flag, instance, optional, provides, several, shown, whole
+from ...core.checks import check_word, flag, instance, optional, provides, quote, several, whole
 from ...core.errors import InputError
 from ...laws.materials import (
     BLIND_TO_RATIOS,
@@ -226,7 +226,7 @@ def _check_degree(degree: Any) -> None:
     """Raise InputError unless the degree is 1 or 2."""
     if isinstance(degree, bool) or degree not in (1, 2):
         raise InputError(
-            f"assemble: degree is {shown(degree)}; give 1 for P1 and Q1, 2 for P2 and Q2"
+            f"assemble: degree is {quote(degree)}; give 1 for P1 and Q1, 2 for P2 and Q2"
         )
 
 

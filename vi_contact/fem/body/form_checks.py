@@ -16,7 +16,7 @@ from ufl.algorithms.check_arities import ArityMismatch
 from ...core.algebra import largest
 from ...core.checks import function, instance, on_all
 from ...core.errors import InputError
-from ...core.matrix_checks import SYMMETRIC, asymmetry, probe
+from ...core.matrix_checks import SYMMETRIC, measure_asymmetry, probe
 from .. import compat
 from ..matrices.petsc_algebra import PetscMatrix
 from .space import FemSpace
@@ -124,7 +124,7 @@ def matrix_of(name: str, space: FemSpace, compiled: Callable[[], Any]) -> Any:
 
 def is_symmetric(matrix: Any, space: FemSpace) -> bool:
     """Return whether a full matrix is symmetric to round-off. Collective."""
-    return asymmetry(PetscMatrix(matrix), space.comm, _numbers(space)) <= SYMMETRIC
+    return measure_asymmetry(PetscMatrix(matrix), space.comm, _numbers(space)) <= SYMMETRIC
 
 
 def refuse_masses(matrix: Any, space: FemSpace) -> None:

@@ -9,7 +9,7 @@ from ufl.core.expr import Expr
 from ufl.domain import extract_domains
 
 from ...core.algebra import Array, Indices, Mask
-from ...core.checks import at, on_all, refuse, shown
+from ...core.checks import describe_point, on_all, quote, refuse
 from ...core.checks import number as number_given
 from ...core.errors import InputError
 from ...laws.materials import ElasticValues
@@ -69,7 +69,7 @@ class Heterogeneous:
                 continue
             given = callable(value) and not isinstance(value, type)
             if not given and not low < number_given("Heterogeneous", words, value) < high:
-                raise InputError(f"Heterogeneous: {words} is {shown(value)}; give {remedy}")
+                raise InputError(f"Heterogeneous: {words} is {quote(value)}; give {remedy}")
 
     @property
     def varies(self) -> bool:
@@ -155,4 +155,4 @@ def _defects(values: dict[str, Array], mine: Mask, space: Any) -> Iterator[str]:
         if len(wrong):
             place = space.tabulate_dof_coordinates()[wrong[0], : space.mesh.geometry.dim]
             found = values[name][wrong[0]]
-            yield f"Heterogeneous: {words} is {found:g} at {at(place)}; give {remedy}"
+            yield f"Heterogeneous: {words} is {found:g} at {describe_point(place)}; give {remedy}"

@@ -116,7 +116,7 @@ class Hierarchy:
         entries = sp.csr_matrix(
             (values[used], (row[used], columns[used])), shape=(free.sum(), space.unknowns)
         )
-        return as_petsc(algebra.replaced_rows(n, own[free], entries))
+        return as_petsc(algebra.replace_identity_rows(n, own[free], entries))
 
 
 def _product(A: PetscMatrix, B: Matrix | None) -> Matrix:

@@ -12,7 +12,7 @@ import numpy as np
 import ufl
 
 from ...core.algebra import Array, total
-from ...core.checks import array, function, optional, shape_of, shown
+from ...core.checks import array, find_shape, function, optional, quote
 from ...core.errors import InputError
 from ...core.quantities import RATIO
 from ...laws.materials import PlaneStress
@@ -107,11 +107,11 @@ def _tensors(
     Raises:
         InputError: none of these dimensions has the shape.
     """
-    shape = shape_of(value)
+    shape = find_shape(value)
     if shape != leading and shape not in {
         (*leading, n, n) for d in dimensions for n in (d, 3 if d == 2 else d)
     }:
-        what = f"is {shown(value)}" if -1 in shape else f"has shape {shape}"
+        what = f"is {quote(value)}" if -1 in shape else f"has shape {shape}"
         ask, k = (
             (f"numbers ({leading[0]},), tensors", f"{leading[0]}, ")
             if leading

@@ -16,7 +16,7 @@ import ufl
 from dolfinx.mesh import Mesh
 
 from ...core.algebra import Array, Comm, Indices
-from ...core.checks import explain_error, function, number, optional, refuse, shown
+from ...core.checks import explain_error, function, number, optional, quote, refuse
 from ...core.quantities import Unit
 from .. import compat
 from ..mesh.group_checks import components_given, components_of, facets_of, field_given
@@ -66,7 +66,7 @@ def evaluate_here(name: str, value: Value, points: Array, t: float) -> tuple[Arr
         # of a user's function, at the points of one rank: the others must not wait for it
         return np.zeros_like(points), explain_error(f"{name} at t = {t:g} s", error)
     if result.dtype.kind not in "iuf":
-        defect = f"{name} returned {shown(result)}: return real numbers"
+        defect = f"{name} returned {quote(result)}: return real numbers"
     elif result.shape != points.shape:
         shape = f"shape {result.shape} for {len(points)} points"
         defect = f"{name} returned {shape}: return {points.shape[1]} components per point"

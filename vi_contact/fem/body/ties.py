@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.algebra import Array, Indices
-from ...core.checks import at
+from ...core.checks import describe_point
 from ...core.errors import InputError
 from ...meshes.rows import number_parts
 from ..mesh.group_checks import components_given, components_of, facets_of
@@ -128,8 +128,8 @@ def _pairs(
         )
     for shared in first[1][np.isin(first[0], second[0])]:
         raise InputError(
-            f"tied boundaries {names} share the node {at(shared)}: tie boundaries without common "
-            "nodes"
+            f"tied boundaries {names} share the node {describe_point(shared)}: tie boundaries "
+            "without common nodes"
         )
     from scipy.spatial import cKDTree
 
@@ -139,8 +139,8 @@ def _pairs(
     worst = int(distance.argmax())
     if distance[worst] > near or len(set(partner)) < len(partner):
         raise InputError(
-            f"node {at(first[1][worst])} of tied boundaries {names} has no partner opposite it on "
-            "the other: mesh both sides alike"
+            f"node {describe_point(first[1][worst])} of tied boundaries {names} has no partner "
+            "opposite it on the other: mesh both sides alike"
         )
     components = np.array(components_of("tied", tie.components, dimension))
     return (

@@ -24,7 +24,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, from_each
-from ...core.checks import at, refuse
+from ...core.checks import describe_point, refuse
 from .. import compat
 from ..body.hierarchical import Hierarchy
 from ..body.space import FemSpace
@@ -87,8 +87,8 @@ def _bubbles(space: FemSpace, hierarchy: Hierarchy, facets: Facets, everywhere: 
     where = points[rows[:, 3:][wrong.any(axis=2)]][:1]
     refuse(
         [
-            f"the mid-point {at(point)} on '{facets.name}' is prescribed and the ends of its edge "
-            "are not: prescribe all nodes of an edge, or none"
+            f"the mid-point {describe_point(point)} on '{facets.name}' is prescribed and the ends "
+            "of its edge are not: prescribe all nodes of an edge, or none"
             for point in where
         ],
         space.comm,

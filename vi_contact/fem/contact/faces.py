@@ -16,7 +16,7 @@ import numpy as np
 import ufl
 
 from ...core.algebra import Array, Indices, Mask, from_each
-from ...core.checks import at, number
+from ...core.checks import describe_point, number
 from ...core.errors import InputError
 from ...meshes.rows import number_alike, number_parts
 from .. import compat
@@ -373,7 +373,9 @@ def tell_corners(space: FemSpace, name: str, nodes: Nodes, slots: Indices, angle
     numbers, points = gather_rows(space.comm, slots[rows], nodes.points[rows])
     if space.comm.rank == 0 and len(numbers):
         some = points[np.argsort(numbers)[:NAMED]]
-        places = ", ".join(at(point) for point in some) + (", …" if len(numbers) > NAMED else "")
+        places = ", ".join(map(describe_point, some))
+        if len(numbers) > NAMED:
+            places += ", …"
         log.info(
             "'%s' turns by more than %.4g degrees at %d contact nodes, which have one condition "
             "for every face: %s",

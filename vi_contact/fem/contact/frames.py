@@ -17,15 +17,15 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, Mask, Matrix, largest
-from ...core.checks import at
-from ...core.corners import PARALLEL, are_orthogonal, corner_frame
+from ...core.checks import describe_point
+from ...core.corners import PARALLEL, are_orthogonal, make_corner_frame
 from ...core.errors import InputError
 from ...core.surfaces import (
     ContactSurface,
+    arrange_frames,
     group_same_nodes,
-    nodal_blocks,
-    nodal_frames,
-    tangential_columns,
+    list_tangential_columns,
+    make_nodal_frames,
 )
 from ..mesh.nodal_space import NodalSpace
 from .borrowing import Borrowed
@@ -108,7 +108,7 @@ class NodalFrames:
         self.numbers, first, place = np.unique(numbers, return_index=True, return_inverse=True)
         self.place: Indices = place.ravel()
         self.double: Mask = np.bincount(self.place) > 1
-        column, self.blocks = nodal_blocks(nodal_frames(self.directions[first]))
+        column, self.blocks = arrange_frames(make_nodal_frames(self.directions[first]))
         self.column = column[self.place]
         self.turns = self.blocks.copy()
         self.rubs = np.ones((len(numbers), self.blocks.shape[1] - 1), dtype=bool)
@@ -121,7 +121,7 @@ class NodalFrames:
     def _turn_corner(self, slots: Indices) -> None:
         """Give a node with several conditions its frame."""
         node = self.place[slots[0]]
-        self.column[slots], block = corner_frame(self.directions[slots])
+        self.column[slots], block = make_corner_frame(self.directions[slots])
         self.blocks[node] = block
         self.turns[node] = (
             block if are_orthogonal(self.directions[slots]) else np.linalg.inv(block).T
@@ -138,21 +138,22 @@ class NodalFrames:
         m = self.place.size
         d = self.blocks.shape[1]
         own = np.zeros((m, d), dtype=bool)
-        np.put_along_axis(own, tangential_columns(self.column, d), self.rubs, axis=1)
+        np.put_along_axis(own, list_tangential_columns(self.column, d), self.rubs, axis=1)
         own[np.arange(m), self.column] = True
         return own
 
     def _refuse_prescribed(self, held: Mask) -> None:
         for slot in np.flatnonzero(np.any(held & (self.directions != 0.0), axis=1)):
             raise InputError(
-                f"contact node {at(self.points[slot])} is also prescribed along its contact "
-                "direction: free that component or leave the node out of the contact surface"
+                f"contact node {describe_point(self.points[slot])} is also prescribed along its "
+                "contact direction: free that component or leave the node out of the contact "
+                "surface"
             )
 
     def _refuse_dependent(self, slots: Indices) -> None:
         directions = self.directions[slots]
         k, d = directions.shape
-        where = f"contact node {at(self.points[slots[0]])}"
+        where = f"contact node {describe_point(self.points[slots[0]])}"
         cosines = (directions @ directions.T)[np.triu_indices(k, 1)]
         if np.any(cosines > 1.0 - PARALLEL):
             raise InputError(
@@ -213,7 +214,7 @@ def surface_of(space: NodalSpace, parts: Sequence[NodalConditions], **data: Any)
     place = frames.place
     column = frames.column
     count = len(slots)
-    tangents = np.take_along_axis(index[place], tangential_columns(column, d), axis=1)
+    tangents = np.take_along_axis(index[place], list_tangential_columns(column, d), axis=1)
     turn = _turn(space, frames.turns, index)
     dual = _turn(space, frames.blocks, index) if largest(comm, frames.oblique) else None
     if space.hierarchy is not None:
@@ -315,7 +316,7 @@ def _coupling(
                     start=diagonal,
                 )
             )
-    return algebra.replaced_rows(n, np.concatenate(own), sp.csr_matrix(sp.vstack(entries)))
+    return algebra.replace_identity_rows(n, np.concatenate(own), sp.csr_matrix(sp.vstack(entries)))
 
 
 def _turns(space: NodalSpace, frames: NodalFrames, numbers: Indices) -> Array:
@@ -375,7 +376,7 @@ def _refuse_chains(space: NodalSpace, parts: Sequence[NodalConditions]) -> None:
             space.at_nodes(space.leaders(facing.nodes.numbers), first)[:, 0] * space.comm.max(used)
         )
         if len(both):
-            where = f"node {at(facing.nodes.points[both[0]])}"
+            where = f"node {describe_point(facing.nodes.points[both[0]])}"
             if space.hierarchy is not None:
                 raise InputError(
                     f"{where} of P2 tetrahedra is on side 2 of a contact pair and of another "

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...core.algebra import Array, Comm, Indices, Mask, from_each
-from ...core.checks import at
+from ...core.checks import describe_point
 from ...core.errors import InputError
 from .. import compat
 from ..body.space import FemSpace
@@ -101,7 +101,7 @@ def refuse_hinges(owner: str, names: Sequence[str], points: Array) -> None:
     """
     if not len(points):
         return
-    places = " and ".join(at(point) for point in points[:NAMED])
+    places = " and ".join(describe_point(point) for point in points[:NAMED])
     where = f"at {places}" if len(points) <= NAMED else f"the first at {places}"
     if len(names) == 2:
         shared = f"'{names[0]}' and '{names[1]}' share {len(points)} nodes"

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.corners import tangent_vectors
+from ...core.corners import make_tangent_vectors
 from ...core.errors import InputError
 from ...core.surfaces import ContactSurface
 from .frames import FemSurface, NodalFrames, given, surface_of
@@ -93,11 +93,12 @@ def _slide(made: Sequence[FemSurface]) -> Motion | None:
     corners = np.flatnonzero(frames.double[frames.place])
     if joined is None or not len(corners):
         return joined
-    before = np.concatenate([tangent_vectors(surface.normals, surface.nodes) for surface in made])[
-        corners
-    ]
+    before = np.concatenate(
+        [make_tangent_vectors(surface.normals, surface.nodes) for surface in made]
+    )[corners]
     after = (
-        tangent_vectors(frames.directions, frames.place)[corners] * frames.rubs[corners, None, :]
+        make_tangent_vectors(frames.directions, frames.place)[corners]
+        * frames.rubs[corners, None, :]
     )
     turn = np.einsum("kic,kie->kce", after, before)
 

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, Mask
 from ...core.arguments import check_fields
-from ...core.checks import at
+from ...core.checks import describe_point
 from ...core.errors import InputError
 from ...core.quantities import Positive
 from .nodes import Nodes
@@ -141,15 +141,16 @@ class NodeToNode:
         if len(missing):
             raise InputError(
                 f"{len(missing)} of {len(partner)} nodes of '{one.name}' have no node of "
-                f"'{two.name}' opposite, the first at {at(one.nodes.points[missing[0]])}: mesh "
-                "both sides alike, make the smaller side the first, or use matching=DualMortar()"
+                f"'{two.name}' opposite, the first at "
+                f"{describe_point(one.nodes.points[missing[0]])}: mesh both sides alike, make the "
+                "smaller side the first, or use matching=DualMortar()"
             )
         first, counts = np.unique(partner, return_counts=True)
         if counts.max() > 1:
             raise InputError(
                 f"several nodes of '{one.name}' face the node of '{two.name}' at "
-                f"{at(two.nodes.points[first[counts.argmax()]])}: mesh both sides alike, or use "
-                "matching=DualMortar()"
+                f"{describe_point(two.nodes.points[first[counts.argmax()]])}: mesh both sides "
+                "alike, or use matching=DualMortar()"
             )
         m = len(partner)
         P = sp.csr_matrix((np.ones(m), (np.arange(m), partner)), shape=(m, len(two.nodes.points)))
@@ -266,8 +267,8 @@ def _refuse_several(one: Side, two: Side, row: int) -> None:
         row: the place of the node on side 1.
     """
     where = (
-        f"the node of '{one.name}' at {at(one.nodes.points[row])} faces several nodes of "
-        f"'{two.name}' at one place"
+        f"the node of '{one.name}' at {describe_point(one.nodes.points[row])} faces several nodes "
+        f"of '{two.name}' at one place"
     )
     d = one.nodes.points.shape[1]
     if d == 1:
@@ -289,8 +290,8 @@ def refuse_same_way(one: str, two: str, point: Array) -> None:
         point: (d,) where [m].
     """
     raise InputError(
-        f"'{two}' does not face '{one}' at {at(point)}, where both outward normals point the same "
-        "way: choose the two boundaries between the bodies"
+        f"'{two}' does not face '{one}' at {describe_point(point)}, where both outward normals "
+        "point the same way: choose the two boundaries between the bodies"
     )
 
 

@@ -21,7 +21,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, Mask
-from ...core.checks import at, flag, optional, provides
+from ...core.checks import describe_point, flag, optional, provides
 from ...core.collective import together
 from ...core.corners import FEATURE_ANGLE
 from ...core.errors import InputError
@@ -300,7 +300,7 @@ def _warn_of_coarse(space: FemSpace, one: Side, two: Side, little: Indices) -> N
         little: numbers of these nodes.
     """
     if len(little) and space.comm.rank == 0:
-        where = at(one.nodes.points[np.searchsorted(one.nodes.numbers, little[0])])
+        where = describe_point(one.nodes.points[np.searchsorted(one.nodes.numbers, little[0])])
         log.warning(
             "%d contact nodes of '%s', the first at %s, have hardly anything of '%s' in front of "
             "their facets, and no whole facet is near: their pressures are left out of the largest "
@@ -432,7 +432,7 @@ def _refuse_common(one: Side, two: Side) -> None:
     """Raise InputError for a facet that is listed on both sides."""
     own, others = number_alike(*(side.nodes.numbers[side.facets] for side in (one, two)))
     for facet in np.flatnonzero(np.isin(own, others))[:1]:
-        where = at(one.nodes.points[one.facets[facet]].mean(axis=0))
+        where = describe_point(one.nodes.points[one.facets[facet]].mean(axis=0))
         raise InputError(
             f"a facet of both '{one.name}' and '{two.name}' at {where}: a facet cannot touch "
             "itself, so list it on one side only"
@@ -475,8 +475,8 @@ def _faces(space: FemSpace, facets1: Facets, one: Side, angle: float) -> list[tu
         if len(own.numbers) > len(used):
             again = own.points[1:][np.diff(own.numbers) == 0][0]
             raise InputError(
-                f"'{one.name}' turns round and meets itself at {at(again)}: give it as two "
-                "boundaries (fem.joined_surfaces), or treat the corner as smooth (a larger "
+                f"'{one.name}' turns round and meets itself at {describe_point(again)}: give it as "
+                "two boundaries (fem.joined_surfaces), or treat the corner as smooth (a larger "
                 "feature_angle=)"
             )
         tied = None if one.tied is None else one.tied[used]
@@ -575,8 +575,8 @@ def _unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched: Mat
     lost = np.flatnonzero(clamped & ~two.nodes.held[facing].all(axis=1))
     if len(lost):
         raise InputError(
-            f"contact node {at(nodes.points[lost[0]])} of '{name}' is clamped but faces a free "
-            f"node of '{two.name}': make '{two.name}' the first side, or clamp less"
+            f"contact node {describe_point(nodes.points[lost[0]])} of '{name}' is clamped but "
+            f"faces a free node of '{two.name}': make '{two.name}' the first side, or clamp less"
         )
     if clamped.all():
         raise InputError(
@@ -611,11 +611,11 @@ def _gap(
     if behind.max() > 0.0:
         worst = int(np.argmax(behind))
         raise InputError(
-            f"'{two.name}' lies {-gap[worst]:.3g} m behind '{name}' at {at(nodes.points[worst])}: "
-            "the bodies overlap there, or these are not the boundaries between them; choose the "
-            "sides that face, or draw the bodies in touch and make a press fit by "
-            "fem.InitialStrain, the strain of the body that is too large, or by quasi_static on "
-            "surface.moving(towards=…), its overlap"
+            f"'{two.name}' lies {-gap[worst]:.3g} m behind '{name}' at "
+            f"{describe_point(nodes.points[worst])}: the bodies overlap there, or these are not "
+            "the boundaries between them; choose the sides that face, or draw the bodies in touch "
+            "and make a press fit by fem.InitialStrain, the strain of the body that is too large, "
+            "or by quasi_static on surface.moving(towards=…), its overlap"
         )
     if gap.min() < -1e-12 * space.size and space.comm.rank == 0:
         log.warning(

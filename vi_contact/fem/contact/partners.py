@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.algebra import Array, Indices, Mask
-from ...core.surfaces import nodal_frames
+from ...core.surfaces import make_nodal_frames
 
 FLAT = 1e-6  # of a length: what is shorter when it is seen along a normal has no direction
 BORDER = 1e-6  # radians by which a direction may leave a facet's corner and count as on its border
@@ -42,7 +42,7 @@ def in_front(one: Surface, node: int, normal: Array, two: Surface, partner: int)
         two: side 2.
         partner: the place of its partner on side 2.
     """
-    frame = nodal_frames(normal[None])[0][:, 1:]
+    frame = make_nodal_frames(normal[None])[0][:, 1:]
     ways = (one.around(node).mean(axis=1) - one.points[node]) @ frame
     arms = (two.around(partner) - two.points[partner]) @ frame
     found = np.zeros(len(ways), dtype=bool)

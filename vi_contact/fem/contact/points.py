@@ -12,7 +12,7 @@ from ...core.algebra import Array, Indices
 from ...core.checks import array, instance, integers, optional, provides
 from ...core.collective import agree, together
 from ...core.errors import InputError
-from ...core.obstacles import Obstacle, admissible_gap, locate_obstacle
+from ...core.obstacles import Obstacle, check_gap, locate_obstacle
 from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem
 from ..matrices.own_matrices import MatrixSpace
@@ -117,7 +117,7 @@ def contact_points(
             gap if gap0 is not None else np.sum((faced.points - every.points) * directions, axis=1)
         )
     with together(space.comm):
-        gap = admissible_gap(gap, every.points, space.size)
+        gap = check_gap(gap, every.points, space.size)
     own = np.flatnonzero(space.blocks_of(numbers) >= 0)
     pairs = None if faced is None else Facing(faced, sp.identity(m, format="csr")[own])
     part = NodalConditions(every.pick(own), snapped(directions)[own], own, pairs)

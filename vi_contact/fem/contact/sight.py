@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array, Indices, Mask
-from ...core.checks import at
+from ...core.checks import describe_point
 from ...core.errors import InputError
-from ...core.surfaces import nodal_frames
+from ...core.surfaces import make_nodal_frames
 from ...meshes.rows import number_parts
 from .clipping import areas, cross, overlaps, stacked, turns, without
 from .matching import DISTANCES, EDGE_ON, Side
@@ -67,7 +67,7 @@ def facets_of(side: Side, sense: int) -> Facets:
     inward = np.sum(normals[:, None, :] * side.nodes.normals[nodes], axis=(1, 2)) < 0.0
     normals = np.where(inward[:, None], -normals, normals)
     # order the corners by their angle round the middle, from that of the first one on
-    seen = np.einsum("kvi,kic->kvc", spokes, nodal_frames(normals)[:, :, 1:])
+    seen = np.einsum("kvi,kic->kvc", spokes, make_nodal_frames(normals)[:, :, 1:])
     sine = cross(seen[:, :1], seen)
     cosine = np.sum(seen[:, :1] * seen, axis=2)
     angle = np.arctan2(sine, cosine) % (2.0 * np.pi)
@@ -79,8 +79,8 @@ def facets_of(side: Side, sense: int) -> Facets:
     reach = np.linalg.norm(spokes, axis=2).max(axis=1)
     for bad in np.flatnonzero((turns(seen) <= SLIVER * reach[:, None] ** 2).any(axis=1)):
         raise InputError(
-            f"a facet of '{side.name}' at {at(middles[bad])} is a sliver or not convex: its normal "
-            "cannot be trusted, so mesh this boundary again"
+            f"a facet of '{side.name}' at {describe_point(middles[bad])} is a sliver or not "
+            "convex: its normal cannot be trusted, so mesh this boundary again"
         )
     return Facets(nodes[:, ::sense], corners[:, ::sense], middles, normals, reach)
 
@@ -126,7 +126,7 @@ def looks_of(ours: Facets, nodes: Nodes) -> Looks:
     each_node = np.tile(np.eye(v), ((~plane).sum(), 1))
     asking = np.concatenate([all_nodes, each_node]) > 0.0
     along = np.concatenate([ours.normals[plane], normals[~plane].reshape(-1, 3)])
-    frames = nodal_frames(along)[:, :, 1:]
+    frames = make_nodal_frames(along)[:, :, 1:]
     slant = np.sum(along * ours.normals[facet], axis=1)
     polygons = np.einsum("kvi,kic->kvc", ours.corners[facet] - ours.middles[facet, None, :], frames)
     looks = Looks(

@@ -12,12 +12,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, from_each, largest, total
-from ...core.checks import array, at, flag, optional, provides, several
+from ...core.checks import array, describe_point, flag, optional, provides, several
 from ...core.collective import agree
-from ...core.corners import FEATURE_ANGLE, PARALLEL, tangent_vectors
+from ...core.corners import FEATURE_ANGLE, PARALLEL, make_tangent_vectors
 from ...core.errors import InputError
-from ...core.obstacles import Obstacle, Touching, admissible_gap, locate_obstacle
-from ...core.surfaces import ContactSurface, tangential_columns
+from ...core.obstacles import Obstacle, Touching, check_gap, locate_obstacle
+from ...core.surfaces import ContactSurface, list_tangential_columns
 from ...core.system import SemiDiscreteSystem
 from ...core.timing import report_time
 from ..body.space import FemSpace, space_of
@@ -183,10 +183,10 @@ def moved_by_held(
     frames = NodalFrames(*given(conditions))
     free = ~joined_nodes([one.nodes for one in conditions]).held
     free = (
-        np.take_along_axis(free, tangential_columns(frames.column, space.dimension), axis=1)
+        np.take_along_axis(free, list_tangential_columns(frames.column, space.dimension), axis=1)
         & frames.rubs
     )
-    tangents = tangent_vectors(frames.directions, frames.place)
+    tangents = make_tangent_vectors(frames.directions, frames.place)
     directions = frames.directions
     # what conditions face, and shares of it
     faced = [_faced_by(part) for part in conditions]
@@ -239,7 +239,7 @@ def _obstacle(
         directions, gap = locate_obstacle(
             way, points, normals, name=name, angle=angle, alone=len(points) == count
         )
-        return snapped(directions), admissible_gap(gap, points, size)
+        return snapped(directions), check_gap(gap, points, size)
 
     return ask
 
@@ -288,7 +288,7 @@ def _looking(
         cosine = np.sum(ways * normals, axis=1)
         rows = np.flatnonzero(cosine > EDGE_ON * np.linalg.norm(ways, axis=1))
         directions[rows] = snapped(ways[rows])
-        gap[rows] = admissible_gap(gaps[rows], points[rows], size)
+        gap[rows] = check_gap(gaps[rows], points[rows], size)
         return directions, gap
 
     return ask
@@ -444,21 +444,23 @@ def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], nam
         row = int(np.argmin(distance))
         if distance[row] > 0.05 * space.size:
             raise InputError(
-                f"contact point {at(x)} is {distance[row]:.3g} m away from boundary group "
-                f"'{name}': give a point on it"
+                f"contact point {describe_point(x)} is {distance[row]:.3g} m away from boundary "
+                f"group '{name}': give a point on it"
             )
         if distance[row] > 1e-6 * space.size and space.comm.rank == 0:
             log.warning(
                 "contact point %s is replaced by the nearest node, %.3g m away",
-                at(x),
+                describe_point(x),
                 distance[row],
             )
         if nodes.held[row].all():
-            raise InputError(f"contact point {at(x)} is also clamped: leave it out, or clamp less")
+            raise InputError(
+                f"contact point {describe_point(x)} is also clamped: leave it out, or clamp less"
+            )
         if row in rows:
             raise InputError(
-                f"contact point {at(x)} is listed twice (nearest node {nodes.numbers[row]}): list "
-                "each once"
+                f"contact point {describe_point(x)} is listed twice (nearest node "
+                f"{nodes.numbers[row]}): list each once"
             )
         rows.append(row)
     if not rows:
@@ -503,8 +505,8 @@ def merged(
                 "tie all components" if partly else "add the boundary of that node to the group"
             )
             raise InputError(
-                f"contact node {at(nodes.points[row])} of '{name}' {how}: leave it out, by listing "
-                f"the others as points=, or {remedy}"
+                f"contact node {describe_point(nodes.points[row])} of '{name}' {how}: leave it "
+                f"out, by listing the others as points=, or {remedy}"
             )
         target[row] = alike[turn.argmax()]
     # one condition for all that have one target: shares are their weights over the sum of these

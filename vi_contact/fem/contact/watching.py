@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array, Mask, from_each, largest
-from ...core.checks import at
+from ...core.checks import describe_point
 from ...core.errors import InputError
 from .frames import Facing
 from .nodes import Nodes
@@ -59,7 +59,7 @@ class Watched:
 
         return replace(self, advance=advance)
 
-    def carried(self, ground: Callable[[float], Array]) -> "Watched":
+    def carry(self, ground: Callable[[float], Array]) -> "Watched":
         """Return the same nodes before an obstacle that the ground carries, t [s] -> (d,) [m]."""
         return (
             self
@@ -97,9 +97,9 @@ class Watched:
         depth, _, point = max(found, key=lambda one: (one[0], -one[1]))
         what = "its obstacle" if self.side is None else f"'{self.side}'"
         raise InputError(
-            f"contact node {at(point)} of '{self.name}' is prescribed in every component and is "
-            f"driven {depth:.3g} m into {what} at t = {t:.6g} s: prescribe a motion that keeps "
-            "off, or only the components at right angles to its contact direction"
+            f"contact node {describe_point(point)} of '{self.name}' is prescribed in every "
+            f"component and is driven {depth:.3g} m into {what} at t = {t:.6g} s: prescribe a "
+            "motion that keeps off, or only the components at right angles to its contact direction"
         )
 
     def _towards(self, t: float) -> tuple[Array, float]:

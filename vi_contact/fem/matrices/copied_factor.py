@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, SerialComm, largest
-from ...kernels.compiler import addresses, load_cholmod, load_loops
+from ...kernels.compiler import load_cholmod, load_loops, locate_arrays
 from ...kernels.contact_last import AT_ONCE, ContactLast
 from .petsc_rows import rows_of
 
@@ -56,11 +56,11 @@ def product_of_rows(matrix: Any) -> Callable[[Array], Array]:
     if functions is None or A.indices.dtype != np.int32:
         return lambda x: np.stack([matrix @ row for row in x])
     kept = A.indptr, A.indices, A.data, np.empty(AT_ONCE * n)
-    *before, room = addresses(*kept)
+    *before, room = locate_arrays(*kept)
 
     def product(x: Array, _: Any = kept) -> Array:  # which holds what lies there
         x, made = np.ascontiguousarray(x), np.empty(x.shape)
-        b, out = addresses(x, made)
+        b, out = locate_arrays(x, made)
         functions.product_many(len(x), n, *before, b, room, out)
         return made
 

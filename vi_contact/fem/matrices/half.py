@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
-from ...core.algebra import Array, Indices, Matrix, largest, total, upper_blocks
+from ...core.algebra import Array, Indices, Matrix, largest, take_upper_blocks, total
 from ..mesh.communicators import give_back
 from .petsc_algebra import PetscAlgebra, PetscMatrix, UnsymmetricAlgebra, as_petsc, triple_product
 from .petsc_rows import aij_of, rows_of
@@ -152,7 +152,7 @@ class CompactAlgebra(PetscAlgebra):
             del rows
             rows = sp.csr_matrix((values, (row, columns)), shape=(n, size))
             del values, row, columns, kept
-        ends, columns, values = upper_blocks(rows, width, first)
+        ends, columns, values = take_upper_blocks(rows, width, first)
         del rows
         arrays = (ends.astype(kind), columns.astype(kind), values)
         made = PETSc.Mat().createSBAIJ(

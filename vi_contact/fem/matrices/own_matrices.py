@@ -27,7 +27,7 @@ from ...core.algebra import (
 )
 from ...core.checks import array, integers, on_all, refuse
 from ...core.errors import InputError
-from ...core.matrix_checks import SYMMETRIC, asymmetry, matrix_defects
+from ...core.matrix_checks import SYMMETRIC, find_matrix_defects, measure_asymmetry
 from ...core.system import Load, SemiDiscreteSystem
 from ...laws.free_motions import Unheld, floats
 from ..mesh.nodal_space import NodalSpace, bounding_box, parts_of
@@ -142,8 +142,8 @@ def own_system(
         comm,
     )
     numbers = algebra.first(n) + np.arange(n)
-    refuse(list(matrix_defects(owner, comm, numbers, **matrices)), comm)
-    skew = [name for name, A in matrices.items() if asymmetry(A, comm, numbers) > SYMMETRIC]
+    refuse(list(find_matrix_defects(owner, comm, numbers, **matrices)), comm)
+    skew = [name for name, A in matrices.items() if measure_asymmetry(A, comm, numbers) > SYMMETRIC]
     algebra = unsymmetric if skew else algebra
     every = matrices["M"]
     influence = (component[:, None] == np.arange(d)).astype(float)

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
-from ...core.algebra import Array, Factor, Indices, Mask, Matrix, identity_with, total
+from ...core.algebra import Array, Factor, Indices, Mask, Matrix, build_identity_with_rows, total
 from ...kernels.contact_last import ContactLast
 from ..mesh.communicators import MpiComm, give_back
 from .copied_factor import contact_last, product_of_rows
@@ -300,7 +300,7 @@ class PetscAlgebra:
         part.destroy()
         return found
 
-    def replaced_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
+    def replace_identity_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
         """Return the identity of n owned rows with some of them replaced.
 
         Args:
@@ -309,7 +309,7 @@ class PetscAlgebra:
             entries: (rows, unknowns of all ranks) what takes their place.
         """
         return PetscMatrix(
-            aij_of(identity_with(n, rows, entries, first=self.first(n)), self.comm.mpi)
+            aij_of(build_identity_with_rows(n, rows, entries, first=self.first(n)), self.comm.mpi)
         )
 
     def with_identity_rows(self, A: Matrix, mask: Mask) -> Matrix:

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ...core.algebra import Array
-from ...core.checks import array, on_all, shown
+from ...core.checks import array, on_all, quote
 from ...core.errors import InputError
 from ...core.system import Load, SemiDiscreteSystem
 from ..mesh.communicators import MpiComm, kept
@@ -65,7 +65,7 @@ def system_from_matrices(
     }
     if not isinstance(K, PETSc.Mat):
         raise InputError(
-            f"{OWNER}: K is {shown(K)}; give a PETSc.Mat, or scipy matrices to "
+            f"{OWNER}: K is {quote(K)}; give a PETSc.Mat, or scipy matrices to "
             "vc.system_from_arrays"
         )
     comm = kept(K.comm.tompi4py())
@@ -98,7 +98,7 @@ def _rows(name: str, A: Any, K: Any) -> sp.csr_matrix:
         return sp.csr_matrix((masses, (np.arange(n), first + np.arange(n))), shape=(n, columns))
     said = ""
     if not isinstance(A, PETSc.Mat):
-        said = f"is {shown(A)}; give a PETSc.Mat"
+        said = f"is {quote(A)}; give a PETSc.Mat"
     elif A.getType() not in ("seqaij", "mpiaij"):
         said = f"is of type {A.getType()}; give AIJ, A.convert('aij')"
     elif not A.isAssembled():

@@ -10,7 +10,7 @@ from typing import Any, cast
 
 from dolfinx.mesh import Mesh
 
-from ...core.checks import array, function, several, shown, whole
+from ...core.checks import array, function, quote, several, whole
 from ...core.errors import InputError
 from .tagged_mesh import Cells, Facets, Group
 
@@ -78,7 +78,7 @@ def _group(owner: str, meaning: str, group: Any, mesh: Mesh | None, wanted: type
             f"fem.{wanted.__name__}.tagged(name, tags, value, mesh) with the value that is meant"
         )
     raise InputError(
-        f"{owner}: {meaning} is {shown(group)}; give a {kind}, such as tags['name'] of "
+        f"{owner}: {meaning} is {quote(group)}; give a {kind}, such as tags['name'] of "
         f"fem.read_mesh or fem.{wanted.__name__}(name, numbers, mesh)"
     )
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Algebra, Array, Comm, Indices, Mask, from_each, largest
-from ...core.checks import at
+from ...core.checks import describe_point
 from ...core.errors import InputError
 from ...meshes.rows import number_parts
 
@@ -123,8 +123,8 @@ class NodalSpace:
             nearest = -largest(self.comm, -np.min(distance, initial=np.inf))
             if nearest > MEANT * self.size:
                 raise InputError(
-                    f"point {at(point)} is {nearest:.3g} m away from the nearest node: give a "
-                    "point of the body"
+                    f"point {describe_point(point)} is {nearest:.3g} m away from the nearest node: "
+                    "give a point of the body"
                 )
             close = self.nodes[distance <= nearest + 1e-9 * self.size]
             found[i] = -int(

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
 
-from ...core.checks import explain_error, function, instance, mask, provides, refuse, shown, whole
+from ...core.checks import explain_error, function, instance, mask, provides, quote, refuse, whole
 from ...core.collective import Parts, agree
 from ...core.errors import InputError
 from ...core.files import on_root
@@ -55,7 +55,7 @@ class Group:
         defect = ""
         if numbers.ndim != 1 or (numbers.dtype.kind not in "iu" and numbers.size):
             defect = (
-                f"{owner}: indices is {shown(self.indices)}; give local numbers, such as "
+                f"{owner}: indices is {quote(self.indices)}; give local numbers, such as "
                 "tags.find(value) returns"
             )
         elif numbers.size and not 0 <= numbers.min() <= numbers.max() < count:

@@ -27,8 +27,8 @@ from ...core.files import (
     FIELDS_INDEX,
     FRAME,
     FRAMES,
-    frames_of,
     hdf5_atomically,
+    list_frames,
     on_root,
     open_hdf5,
     write_atomically,
@@ -178,7 +178,7 @@ class FrameWriter:
             file["cells"] = cells
 
         hdf5_atomically(folder / "mesh.h5", fill)
-        found = frames_of(self._folder)
+        found = list_frames(self._folder)
         self._times = {k: t for k, t in sorted(kept.items()) if k in found}
         self._places = {k: found[k] for k in self._times}
         if self._times:

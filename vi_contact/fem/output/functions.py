@@ -21,9 +21,9 @@ import ufl
 from petsc4py import PETSc
 
 from ...core.algebra import Array, Indices
-from ...core.checks import flag, instance, number, optional, refuse, shown
-from ...core.errors import InputError, of_machine
-from ...core.files import FIELDS, FIELDS_INDEX, frames_of, on_root, open_hdf5
+from ...core.checks import flag, instance, number, optional, quote, refuse
+from ...core.errors import InputError, is_of_machine
+from ...core.files import FIELDS, FIELDS_INDEX, list_frames, on_root, open_hdf5
 from ...core.own_files import inner_folder, is_own, read_bytes
 from ...core.problem import ContactProblem
 from ...core.state_checks import check_problem_given, check_sizes
@@ -155,7 +155,7 @@ def _checked(owner: str, problem: Any, name: Any, continuous: Any) -> FemSpace:
     flag(owner, "continuous", continuous)
     if not isinstance(name, str) or name not in NAMES:
         raise InputError(
-            f"{owner}: {shown(name)} is not a quantity; give one of {', '.join(map(repr, NAMES))}"
+            f"{owner}: {quote(name)} is not a quantity; give one of {', '.join(map(repr, NAMES))}"
         )
     return space_of(owner, problem.system)
 
@@ -177,7 +177,7 @@ def _function(
     system = problem.system
     space = space_of(name, problem.system)
     V = (
-        system.cached("scalars", lambda: compat.lagrange(space.mesh, space.degree))
+        system.make_once("scalars", lambda: compat.lagrange(space.mesh, space.degree))
         if nodal.ndim == 1
         else space.V
     )
@@ -187,7 +187,8 @@ def _function(
     found.x.scatter_forward()
     if name == "stress":
         known_matrices("stress", system, "K")
-        found = system.cached(f"stress {continuous}", lambda: Stress(space, continuous))(found, t)
+        stress = system.make_once(f"stress {continuous}", lambda: Stress(space, continuous))
+        found = stress(found, t)
     found.name = name
     return found
 
@@ -264,7 +265,7 @@ def _stored(
         )
         time, place = places[_chosen([time for time, _ in places], t, frame)]
         file, path = place.split(":")
-        known = {str(one.relative_to(folder)): one for one, _ in frames_of(folder).values()}
+        known = {str(one.relative_to(folder)): one for one, _ in list_frames(folder).values()}
         with (
             open_hdf5(inner_folder(folder, FIELDS) / "mesh.h5") as mesh,
             open_hdf5(known[file]) as fields,
@@ -281,7 +282,7 @@ def _stored(
         ValueError,
         RuntimeError,
     ) as error:
-        if of_machine(error):
+        if is_of_machine(error):
             raise
         raise InputError(
             f"the fields in '{folder}' are incomplete or damaged ({error}): run again"
@@ -310,6 +311,6 @@ def _chosen(times: list[float], t: float | None, frame: int | None) -> int:
     )
     if not wanted or (frame or 0) < -len(times):
         raise InputError(
-            f"no frame {shown(frame) if t is None else f'at t = {shown(t)} s'}: {stored}"
+            f"no frame {quote(frame) if t is None else f'at t = {quote(t)} s'}: {stored}"
         )
     return wanted[0]

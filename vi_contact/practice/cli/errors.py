@@ -13,9 +13,9 @@ from textwrap import shorten
 from typing import Any, NoReturn
 
 from ...core.algebra import SerialComm
-from ...core.checks import SHOWN, shown
-from ...core.errors import InputError, ViContactError, of_memory
-from ...core.files import sentence
+from ...core.checks import SHOWN, quote
+from ...core.errors import InputError, ViContactError, is_of_memory
+from ...core.files import describe_os_error
 
 PATIENCE = 30.0  # seconds between the first rank that has failed and the last
 LIBRARIES = ("dolfinx", "ufl", "basix", "petsc4py", "mpi4py", "h5py", "gmsh", "matplotlib", "tqdm")
@@ -34,9 +34,9 @@ def check_words(arguments: Sequence[str]) -> None:
     """
     for word in arguments:
         if "\0" in word:
-            raise InputError(f"{shown(word)} contains the character NUL: leave it out")
+            raise InputError(f"{quote(word)} contains the character NUL: leave it out")
         if word.startswith("--") and word.endswith("=--"):
-            raise InputError(f"{shown(word)} has no value: give one")
+            raise InputError(f"{quote(word)} has no value: give one")
     for option, value in zip(arguments, [*arguments[1:], None], strict=True):
         apart = option in OUTPUTS and value == ""
         joined = option.endswith("=") and option.removesuffix("=") in OUTPUTS
@@ -69,7 +69,7 @@ def explain_errors(call: Callable[[], Any], spelling: Mapping[str, str]) -> Any:
     try:
         return call()
     except ViContactError as error:
-        if of_memory(error):
+        if is_of_memory(error):
             raise ViContactError(OUT_OF_MEMORY) from error
         if spelling and isinstance(error, InputError):
             raise InputError(_spell_options(str(error), spelling)) from error
@@ -130,10 +130,10 @@ def keep_streams() -> None:
 
 def _explain(error: Exception) -> str | None:
     """Return the sentence of an error of the machine or of a library; None if it has none."""
-    if of_memory(error):
+    if is_of_memory(error):
         return OUT_OF_MEMORY
     if isinstance(error, OSError):
-        return sentence(error)
+        return describe_os_error(error)
     if isinstance(error, ModuleNotFoundError) and error.name in LIBRARIES:
         return (
             f"{error.name} is needed and this Python does not find it: install it "

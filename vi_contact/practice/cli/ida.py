@@ -5,7 +5,7 @@ import shlex
 import signal
 from typing import TYPE_CHECKING, Any
 
-from ...core.checks import shown
+from ...core.checks import quote
 from ...core.errors import InputError, OutOfTime, ViContactError
 from ..studies.cases.library import locate
 from .errors import say
@@ -188,7 +188,7 @@ def _split_launch(text: str) -> list[str]:
     try:
         return shlex.split(text)
     except ValueError as error:
-        raise InputError(f"--launch {shown(text)}: {error}; close the quotation mark") from None
+        raise InputError(f"--launch {quote(text)}: {error}; close the quotation mark") from None
 
 
 def _read_study(options: argparse.Namespace) -> "IDA":

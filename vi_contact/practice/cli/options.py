@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.checks import counted, shown
+from ...core.checks import check_count, quote
 from ...core.errors import InputError
 
 MOST_SPACED = 100_000  # periods or frequencies of a spectrum
@@ -100,7 +100,7 @@ def space_numbers(option: str, values: Sequence[float]) -> Any:
             f"{option} {first:g} {last:g} {count:g}: give FROM below TO and a whole number N from "
             "2 on"
         )
-    number = counted(option, f"N = {count:g}", count, "numbers", most=MOST_SPACED)
+    number = check_count(option, f"N = {count:g}", count, "numbers", most=MOST_SPACED)
     return np.geomspace(first, last, number)
 
 
@@ -128,7 +128,7 @@ def output_file(
         fits = False
     if not fits:
         raise InputError(
-            f"{shown(str(path))}: cannot be written; give the name of a file in a folder that "
+            f"{quote(str(path))}: cannot be written; give the name of a file in a folder that "
             "exists"
         )
     if picture and out.suffix.lower() not in PICTURES:

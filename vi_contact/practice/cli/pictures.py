@@ -5,7 +5,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...core.checks import shown
+from ...core.checks import quote
 from ...core.errors import InputError
 from .errors import world
 from .options import add_command, add_folder, output_file
@@ -236,12 +236,12 @@ def _read_times(run: "RunFolder", text: str | None) -> list[float] | None:
         times = [float(word) for word in text.split(",")]
     except ValueError:
         raise InputError(
-            f"{shown(text)} is not a list of moments: give seconds, such as 3.2,5"
+            f"{quote(text)} is not a list of moments: give seconds, such as 3.2,5"
         ) from None
     first, last = run.history["t"][[0, -1]]
     slack = 1e-9 * (last - first)
     if not all(first - slack <= t <= last + slack for t in times):
         raise InputError(
-            f"{shown(text)} is outside the run: give seconds from {first:g} to {last:g}"
+            f"{quote(text)} is outside the run: give seconds from {first:g} to {last:g}"
         )
     return times

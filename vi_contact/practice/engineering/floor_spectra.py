@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.checks import array, counted, flag, instance, number, optional
+from ...core.checks import array, check_count, flag, instance, number, optional
 from ...core.errors import InputError
 from ..ground_motion.record import Record
 from ..ground_motion.spectra import ResponseSpectrum, response_spectrum
@@ -78,7 +78,7 @@ def recorded_motion(history: Mapping[str, Array], column: str, *, relative: bool
     if np.ptp(steps) > 1e-6 * dt:
         number_of_steps = (t[-1] - t[0]) / dt * (1.0 + 1e-12)
         step_in_words = f"the step of {dt:g} s in {t[-1] - t[0]:g} s"
-        counted(f"column '{column}'", step_in_words, number_of_steps)
+        check_count(f"column '{column}'", step_in_words, number_of_steps)
         even_times = t[0] + dt * np.arange(int(np.floor(number_of_steps)) + 1)
         values = np.interp(even_times, t, values)
     frame = "relative" if relative else "absolute"

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.arguments import checked
+from ...core.arguments import check_arguments
 from ...core.checks import instance, number, several
 from ...core.errors import InputError
 from ...core.files import write_csv
@@ -77,7 +77,7 @@ def peaks(
     return rows
 
 
-@checked
+@check_arguments
 def write_peaks(path: str | Path, rows: Sequence[Peak]) -> Path:
     """Write ``peaks.csv``.
 

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
-from ...core.arguments import checked
+from ...core.arguments import check_arguments
 from ...core.errors import InputError
 from ...core.quantities import RATIO, Positive, Unit
 from .intensity import arias, pga, psa
@@ -112,7 +112,7 @@ class Processing:
         return record
 
 
-@checked
+@check_arguments
 def scaled_to_pga(record: Record, target: Annotated[float, Positive, Unit("m/s²")]) -> Record:
     """Scale a record so that its largest |acceleration| is `target`, and keep its sign.
 
@@ -121,7 +121,7 @@ def scaled_to_pga(record: Record, target: Annotated[float, Positive, Unit("m/s²
     return scaled(record, factor=_ratio(record, target, pga(record)))
 
 
-@checked
+@check_arguments
 def scaled_to_psa(
     record: Record,
     target: Annotated[float, Positive, Unit("m/s²")],
@@ -143,7 +143,7 @@ def scaled_to_psa(
     return scaled(record, factor=_ratio(record, target, psa(record, period, damping=damping)))
 
 
-@checked
+@check_arguments
 def scaled_to_arias(record: Record, target: Annotated[float, Positive, Unit("m/s")]) -> Record:
     """Scale a record so that its Arias intensity is `target`, and keep its sign.
 

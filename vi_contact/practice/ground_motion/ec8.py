@@ -12,7 +12,7 @@ from typing import Annotated
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.arguments import check_fields, checked
+from ...core.arguments import check_arguments, check_fields
 from ...core.checks import real
 from ...core.errors import InputError
 from ...core.quantities import RATIO, Between, Positive, Unit
@@ -56,7 +56,7 @@ class EC8Spectrum:
             raise InputError(f"{self!r}: give periods with tb <= tc <= td")
 
     @classmethod
-    @checked
+    @check_arguments
     def on_ground(
         cls, ground: str, *, ag: float, kind: int = 1, damping: float = 0.05
     ) -> "EC8Spectrum":
@@ -77,7 +77,7 @@ class EC8Spectrum:
         return cls(ag, s, tb, tc, td, damping=damping)
 
     @classmethod
-    @checked
+    @check_arguments
     def vertical(cls, *, ag: float, kind: int = 1, damping: float = 0.05) -> "EC8Spectrum":
         """Return the vertical spectrum S_ve(T) of every ground, eqs. 3.8 to 3.11.
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.arguments import checked
+from ...core.arguments import check_arguments
 from ...core.errors import InputError
 from ...core.units import STANDARD_GRAVITY
 from .processing import integrated
@@ -16,19 +16,19 @@ from .record import UNITS, Record
 from .spectra import fourier_spectrum, response_spectrum
 
 
-@checked
+@check_arguments
 def pga(record: Record) -> float:
     """Return the peak ground acceleration, the largest |a| of the samples [m/s²]."""
     return float(np.max(np.abs(record.acceleration)))
 
 
-@checked
+@check_arguments
 def pga_time(record: Record) -> float:
     """Return the time of the first sample that reaches the peak ground acceleration [s]."""
     return float(np.argmax(np.abs(record.acceleration))) * record.dt
 
 
-@checked
+@check_arguments
 def pgv(record: Record) -> float:
     """Return the peak ground velocity.
 
@@ -38,7 +38,7 @@ def pgv(record: Record) -> float:
     return float(np.max(np.abs(velocity)))
 
 
-@checked
+@check_arguments
 def pgd(record: Record) -> float:
     """Return the peak ground displacement.
 
@@ -48,7 +48,7 @@ def pgd(record: Record) -> float:
     return float(np.max(np.abs(displacement)))
 
 
-@checked
+@check_arguments
 def arias(record: Record) -> float:
     """Return the Arias intensity of the record.
 
@@ -57,7 +57,7 @@ def arias(record: Record) -> float:
     return float(husid(record)[-1])
 
 
-@checked
+@check_arguments
 def d5_95(record: Record) -> float:
     """Return the time between 5 % and 95 % of the Arias intensity [s].
 
@@ -69,7 +69,7 @@ def d5_95(record: Record) -> float:
     return significant_duration(record, 0.05, 0.95)
 
 
-@checked
+@check_arguments
 def husid(record: Record) -> Array:
     """Return the Arias intensity accumulated up to each sample, shape (n,) [m/s]."""
     square = record.acceleration**2
@@ -77,7 +77,7 @@ def husid(record: Record) -> Array:
     return math.pi / (2.0 * STANDARD_GRAVITY) * np.concatenate(([0.0], np.cumsum(steps)))
 
 
-@checked
+@check_arguments
 def significant_duration(record: Record, start: float, end: float) -> float:
     """Return the time between two fractions of the Arias intensity [s].
 
@@ -99,7 +99,7 @@ def significant_duration(record: Record, start: float, end: float) -> float:
     return float(last - first)
 
 
-@checked
+@check_arguments
 def cav(record: Record) -> float:
     """Return the cumulative absolute velocity, the integral of |a| [m/s].
 
@@ -113,7 +113,7 @@ def cav(record: Record) -> float:
     return float(np.sum(0.5 * record.dt * np.where(change, (a**2 + b**2) / total, a + b)))
 
 
-@checked
+@check_arguments
 def rms(record: Record) -> float:
     """Return the root of the mean of a² over the record, by the trapezoidal rule [m/s²]."""
     return math.sqrt(2.0 * STANDARD_GRAVITY / math.pi * arias(record) / record.duration)
@@ -125,7 +125,7 @@ HOUSNER_PERIODS = np.linspace(0.1, 2.5, 241)
 PREDOMINANT_PERIODS = np.geomspace(0.02, 10.0, 400)
 
 
-@checked
+@check_arguments
 def psa(record: Record, period: float, *, damping: float = 0.05) -> float:
     """Return the pseudo-acceleration at one period [m/s²].
 
@@ -138,7 +138,7 @@ def psa(record: Record, period: float, *, damping: float = 0.05) -> float:
     return float(spectrum.psa[0])
 
 
-@checked
+@check_arguments
 def housner_intensity(record: Record, *, damping: float = 0.05) -> float:
     """Return Housner's spectrum intensity.
 
@@ -148,7 +148,7 @@ def housner_intensity(record: Record, *, damping: float = 0.05) -> float:
     return float(np.sum(0.5 * (psv[:-1] + psv[1:]) * np.diff(HOUSNER_PERIODS)))
 
 
-@checked
+@check_arguments
 def predominant_period(record: Record, *, damping: float = 0.05) -> float:
     """Return the period of the largest pseudo-acceleration, from 0.02 to 10 s [s].
 
@@ -163,7 +163,7 @@ def predominant_period(record: Record, *, damping: float = 0.05) -> float:
     return float(periods[np.argmax(spectrum.psa)])
 
 
-@checked
+@check_arguments
 def mean_period(record: Record) -> float:
     """Return the mean period of Rathje, Abrahamson and Bray (1998) [s].
 
@@ -182,7 +182,7 @@ def mean_period(record: Record) -> float:
     return float(np.sum(power / frequencies[inside]) / np.sum(power))
 
 
-@checked
+@check_arguments
 def record_info(record: Record) -> str:
     """Return the table of a record.
 

@@ -10,8 +10,8 @@ from typing import Annotated
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.arguments import check_fields, checked
-from ...core.checks import counted
+from ...core.arguments import check_arguments, check_fields
+from ...core.checks import check_count
 from ...core.errors import InputError
 from ...core.quantities import RATIO, Between, NotNegative, Positive, Unit
 from .record import Record
@@ -90,7 +90,7 @@ class Envelope:
         return np.where(times < self.rise, rising, falling)
 
 
-@checked
+@check_arguments
 def synthetic(
     spectrum: KanaiTajimi,
     duration: Annotated[float, Unit("s")],
@@ -120,7 +120,7 @@ def synthetic(
     if not 0.0 < dt < duration < math.inf:
         raise InputError(f"synthetic: duration={duration!r}, dt={dt!r} s; give 0 < dt < duration")
     seed = int(seed)
-    counted("synthetic", f"duration={duration!r} and dt={dt!r} s", 4.0 * duration / dt)
+    check_count("synthetic", f"duration={duration!r} and dt={dt!r} s", 4.0 * duration / dt)
     count = math.floor(duration / dt * (1.0 + 1e-12)) + 1
     size = 2 ** math.ceil(math.log2(2 * count))
     step = 2.0 * math.pi / (size * dt)

@@ -12,8 +12,8 @@ from typing import Annotated
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.arguments import checked
-from ...core.checks import counted
+from ...core.arguments import check_arguments
+from ...core.checks import check_count
 from ...core.errors import InputError
 from ...core.quantities import Finite, Positive, Unit
 from .record import Record
@@ -23,14 +23,14 @@ LARGEST_RATIO = 1000
 HIGHEST = 6  # highest degree of a baseline: beyond it a polynomial follows the shaking itself
 
 
-@checked
+@check_arguments
 def scaled(record: Record, *, factor: Annotated[float, Finite]) -> Record:
     """Scale every sample by `factor`; a negative one turns the motion round."""
     factor = float(factor)
     return record.changed(factor * record.acceleration, f"scaled by {factor:.6g}")
 
 
-@checked
+@check_arguments
 def resampled(record: Record, dt: Annotated[float, Positive, Unit("s")]) -> Record:
     """Return the record at time step dt.
 
@@ -46,7 +46,7 @@ def resampled(record: Record, dt: Annotated[float, Positive, Unit("s")]) -> Reco
         InputError: a dt that is not such a ratio, or longer than the record.
     """
     dt = float(dt)
-    counted("resampled", f"dt={dt!r} s", record.duration / dt)
+    check_count("resampled", f"dt={dt!r} s", record.duration / dt)
     # late: it takes longer to import than the rest of the package
     from scipy.signal import resample_poly
 
@@ -69,7 +69,7 @@ def resampled(record: Record, dt: Annotated[float, Positive, Unit("s")]) -> Reco
     return record.changed(samples, f"resampled from {record.dt:g} s to {dt:g} s", dt=float(dt))
 
 
-@checked
+@check_arguments
 def integrated(record: Record) -> tuple[Array, Array]:
     """Return ground velocity (n,) [m/s] and displacement (n,) [m] at the samples.
 
@@ -87,7 +87,7 @@ def integrated(record: Record) -> tuple[Array, Array]:
     return velocity, displacement
 
 
-@checked
+@check_arguments
 def trimmed(record: Record, start: float = 0.0, end: float | None = None) -> Record:
     """Keep the samples at start <= t <= end; the first one kept becomes t = 0.
 
@@ -116,7 +116,7 @@ def trimmed(record: Record, start: float = 0.0, end: float | None = None) -> Rec
     return record.changed(record.acceleration[inside], note)
 
 
-@checked
+@check_arguments
 def padded(record: Record, before: float = 0.0, after: float = 0.0) -> Record:
     """Add zeros before and behind the record.
 
@@ -134,13 +134,13 @@ def padded(record: Record, before: float = 0.0, after: float = 0.0) -> Record:
         )
     steps = [length / record.dt * (1.0 - 1e-9) for length in (before, after)]
     total = record.acceleration.size + sum(steps)
-    counted("padded", f"before={before!r} and after={after!r} s", total)
+    check_count("padded", f"before={before!r} and after={after!r} s", total)
     counts = [math.ceil(number) for number in steps]
     note = f"zeros added: {counts[0] * record.dt:g} s before, {counts[1] * record.dt:g} s after"
     return record.changed(np.pad(record.acceleration, counts), note)
 
 
-@checked
+@check_arguments
 def without_mean(record: Record, *, until: float | None = None) -> Record:
     """Subtract the mean of the record, or that of the quiet before the shaking, t <= until [s].
 
@@ -158,7 +158,7 @@ def without_mean(record: Record, *, until: float | None = None) -> Record:
     return record.changed(record.acceleration - mean, f"mean{where} removed: {mean:.6g} m/s2")
 
 
-@checked
+@check_arguments
 def tapered(record: Record, *, fraction: float = 0.05) -> Record:
     """Bring both ends to zero by half a cosine over `fraction` of the record's duration.
 
@@ -175,7 +175,7 @@ def tapered(record: Record, *, fraction: float = 0.05) -> Record:
     return record.changed(record.acceleration * (window * window[::-1]), note)
 
 
-@checked
+@check_arguments
 def filtered(
     record: Record,
     *,
@@ -230,7 +230,7 @@ def filtered(
         lowest = min(corners)
         ringing = 6.0 / (lowest * record.dt)
         size = record.acceleration.size
-        counted("filtered", f"a corner of {lowest:g} Hz", 3.0 * ringing + size)
+        check_count("filtered", f"a corner of {lowest:g} Hz", 3.0 * ringing + size)
         tail = np.zeros(math.ceil(ringing))
         forward = sosfilt(sections, np.concatenate([tail, record.acceleration, tail]))
         both_ways = sosfilt(sections, forward[::-1])[::-1]
@@ -244,7 +244,7 @@ def filtered(
     return record.changed(samples, f"Butterworth {kind} {band} Hz, order {order}, {passes}")
 
 
-@checked
+@check_arguments
 def baseline_corrected(record: Record, *, degree: int = 2, displacement: bool = False) -> Record:
     """Return the record minus p(t) = sum c_k (t/T)^k, k = 0..degree, T its duration.
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.arguments import checked
+from ...core.arguments import check_arguments
 from ...core.checks import array, instance, number
 from ...core.errors import InputError
 from ...core.units import STANDARD_GRAVITY
@@ -142,7 +142,7 @@ def recognise_units(units: str) -> str | None:
     return text if text in UNITS else None
 
 
-@checked
+@check_arguments
 def canonical_units(source: str, units: str) -> str:
     """Return the key of UNITS that `units` spells ("CM/SEC/SEC", "(g)", "cm/s^2").
 

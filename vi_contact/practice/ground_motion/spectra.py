@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.arguments import checked
-from ...core.checks import counted
+from ...core.arguments import check_arguments
+from ...core.checks import check_count
 from ...core.errors import InputError
 from .record import Record
 
@@ -138,7 +138,7 @@ def _sum_series(time: Array | float, omega: Array, zeta: float, first: int) -> A
     return np.array([total, rate])
 
 
-@checked
+@check_arguments
 def response_spectrum(record: Record, periods: Array, *, damping: float = 0.05) -> ResponseSpectrum:
     """Return the peaks of relative displacement and velocity and of absolute acceleration.
 
@@ -169,7 +169,7 @@ def response_spectrum(record: Record, periods: Array, *, damping: float = 0.05) 
             f"{record.dt:g} s and has the peak acceleration alone; begin with longer periods"
         )
     numbers = float(row.size) * record.acceleration.size
-    counted("response_spectrum", f"{row.size} periods", numbers, most=MOST)
+    check_count("response_spectrum", f"{row.size} periods", numbers, most=MOST)
 
     # Oscillators that need the same number of looks a step go together.
     least_parts = 2 ** np.ceil(np.log2(PER_PERIOD * record.dt / row))
@@ -181,7 +181,7 @@ def response_spectrum(record: Record, periods: Array, *, damping: float = 0.05) 
     return ResponseSpectrum(row, damping, *peaks)
 
 
-@checked
+@check_arguments
 def fourier_spectrum(record: Record) -> tuple[Array, Array]:
     """Return the frequencies [Hz], up to the Nyquist frequency, and the amplitudes |A(f)| [m/s].
 

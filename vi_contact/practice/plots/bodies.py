@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array, Indices
-from ...core.arguments import checked
+from ...core.arguments import check_arguments
 from ...core.checks import number, optional
 from ...core.errors import InputError
-from ...core.files import frames_of, write_output
+from ...core.files import list_frames, write_output
 from ...run.files.reading import ContactGeometry, RunFolder
 from .deformed import compute_normals, contact_states, find_nearest, read_frames
 from .faces import (
@@ -236,7 +236,7 @@ def _round_down(factor: float) -> float:
     return float(max([1.0, *steps]))
 
 
-@checked
+@check_arguments
 def plot_deformed(
     run: RunFolder,
     path: str | Path,
@@ -288,7 +288,7 @@ def _compose_title(title: str, scene: Scene) -> str:
     return "\n".join(wrap(escape_dollars(title) + factor, 64))
 
 
-@checked
+@check_arguments
 def film(
     run: RunFolder,
     path: str | Path,
@@ -425,7 +425,7 @@ def _draw_trace(axis: Any, run: RunFolder, column: str, times: Array) -> Any:
     return axis.axvline(times[0], color="tab:red", lw=1.2)
 
 
-@checked
+@check_arguments
 def draw_run(
     run: RunFolder,
     out: str | Path,
@@ -451,7 +451,7 @@ def draw_run(
         the pictures that were written.
     """
     pictures = []
-    if frames_of(run.folder) and read_frames(run).cells.shape[1] > 2:  # no bars
+    if list_frames(run.folder) and read_frames(run).cells.shape[1] > 2:  # no bars
         path = Path(out) / "deformed.png"
         pictures.append(plot_deformed(run, path, times=times, magnified=magnified, title=title))
     contact = run.contact

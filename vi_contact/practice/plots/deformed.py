@@ -15,14 +15,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ...core.algebra import Array, Indices
-from ...core.arguments import checked
+from ...core.arguments import check_arguments
 from ...core.checks import array
-from ...core.errors import InputError, of_machine
-from ...core.files import FIELDS, frames_of, open_hdf5
+from ...core.errors import InputError, is_of_machine
+from ...core.files import FIELDS, list_frames, open_hdf5
 from ...core.own_files import inner_folder
 from ...meshes.rows import SIDES, number_parts
 from ...run.files.reading import RunFolder, read_run
-from ...run.recorders.contact_parts import Geometry, tangent_vectors
+from ...run.recorders.contact_parts import Geometry, make_tangent_vectors
 
 # States of contact points, as contact_status in fields.xdmf.
 OPEN = 1
@@ -182,10 +182,10 @@ def compute_tangents(contact: Geometry) -> Array:
     What is at one place is one node.
     """
     _, node = np.unique(contact.points, axis=0, return_inverse=True)
-    return tangent_vectors(contact.normals, node.ravel())
+    return make_tangent_vectors(contact.normals, node.ravel())
 
 
-@checked
+@check_arguments
 def read_frames(run: RunFolder | str | Path) -> StoredFrames:
     """Read the frames from the fields of a run in plane or space.
 
@@ -196,7 +196,7 @@ def read_frames(run: RunFolder | str | Path) -> StoredFrames:
         InputError: the folder has no fields, or they are damaged.
     """
     folder = run.folder if isinstance(run, RunFolder) else Path(run)
-    places = frames_of(folder)
+    places = list_frames(folder)
     if places:
         history = run.history if isinstance(run, RunFolder) else read_run(folder).history
         times = dict(zip(history["k"].astype(int).tolist(), history["t"].tolist(), strict=True))
@@ -251,7 +251,7 @@ def _open_fields(path: Path) -> Iterator[Any]:
         AttributeError,
         RuntimeError,
     ) as error:
-        if of_machine(error):
+        if is_of_machine(error):
             raise
         reason = " ".join(str(error).split())[:200]
         raise InputError(

@@ -9,14 +9,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ...core.algebra import Array, Indices
-from ...core.arguments import checked
+from ...core.arguments import check_arguments
 from ...core.corners import FEATURE_ANGLE
 from ...core.errors import InputError
-from ...core.files import frames_of
+from ...core.files import list_frames
 from ...core.step import AXES
 from ...meshes.rows import number_parts
 from ...run.files.reading import RunFolder
-from ...run.recorders.contact_parts import Geometry, tangent_vectors
+from ...run.recorders.contact_parts import Geometry, make_tangent_vectors
 from .deformed import (
     OPEN,
     SAME,
@@ -121,7 +121,7 @@ def _make_face(contact: Geometry, sides: Indices, own: Indices, *, flat: bool) -
         name=f"face towards {name_direction(normal[0])}" if flat else "curved face",
         conditions=own,
         points=points[own],
-        axes=tangent_vectors(normal, np.zeros(1, dtype=np.int64))[0] if flat else None,
+        axes=make_tangent_vectors(normal, np.zeros(1, dtype=np.int64))[0] if flat else None,
         parts=cut_shares(points[within]),
         owners=within.ravel(),
     )
@@ -317,7 +317,7 @@ def choose_times(history: History) -> list[float]:
     return history["t"][[0, row, -1]].tolist()
 
 
-@checked
+@check_arguments
 def plot_faces(
     run: RunFolder,
     path: str | Path,
@@ -351,7 +351,7 @@ def plot_faces(
         raise InputError(
             f"'{run.folder}' is not a finished run in space with Contact(): finish one that has it"
         )
-    if frames_of(run.folder):
+    if list_frames(run.folder):
         sides, _ = read_frames(run).facing(contact)
     else:
         sides = np.zeros((0, 3), dtype=np.int64)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.arguments import checked
+from ...core.arguments import check_arguments
 from ...core.errors import InputError
 from ...core.units import STANDARD_GRAVITY
 from ..engineering.floor_spectra import TransferFunction
@@ -31,7 +31,7 @@ from .histories import (
 SAMPLES_A_PERIOD = 10
 
 
-@checked
+@check_arguments
 def plot_motion(
     record: Record, path: str | Path, *, title: str | None = None, units: str = "m/s2"
 ) -> Path:
@@ -69,7 +69,7 @@ def plot_motion(
     return save(figure, path)
 
 
-@checked
+@check_arguments
 def plot_spectra(
     spectra: Mapping[str, ResponseSpectrum],
     path: str | Path,
@@ -156,7 +156,7 @@ def _draw_spectrum(
     return line.get_color()
 
 
-@checked
+@check_arguments
 def plot_loop(
     loop: Loop,
     path: str | Path,
@@ -197,7 +197,7 @@ def plot_loop(
     return save(figure, path)
 
 
-@checked
+@check_arguments
 def plot_transfer(found: TransferFunction, path: str | Path, *, title: str) -> Path:
     """Draw the amplitude of a transfer function over frequency, both logarithmic.
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.arguments import checked
+from ...core.arguments import check_arguments
 from ...core.units import STANDARD_GRAVITY
 from .histories import canvas, escape_dollars, save, scale
 
@@ -37,7 +37,7 @@ class DemandPanel:
     failed: Sequence[float] = ()
 
 
-@checked
+@check_arguments
 def plot_ida(
     demands: Sequence[DemandPanel], path: str | Path, *, intensity: str, unit: str
 ) -> Path:
@@ -68,7 +68,7 @@ def plot_ida(
     return save(figure, path)
 
 
-@checked
+@check_arguments
 def plot_fragility(
     curves: Mapping[str, tuple[Callable[[Array], Array], Array]],
     path: str | Path,

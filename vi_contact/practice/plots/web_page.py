@@ -17,7 +17,7 @@ import numpy as np
 
 from ...core.algebra import Array, Indices
 from ...core.errors import InputError, ViContactError
-from ...core.files import sentence, write_output
+from ...core.files import describe_os_error, write_output
 from ...core.own_files import read_bytes
 from .charts import Chart
 from .histories import STYLE, require_matplotlib
@@ -103,7 +103,7 @@ def write_web_page(
     try:
         write_output(path, text.encode())
     except OSError as error:
-        raise ViContactError(sentence(error)) from error
+        raise ViContactError(describe_os_error(error)) from error
     return path
 
 

@@ -10,8 +10,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.arguments import checked
-from ...core.checks import array, check_word, shown
+from ...core.arguments import check_arguments
+from ...core.checks import array, check_word, quote
 from ...core.errors import InputError
 from ...core.quantities import RATIO, Between, NotNegative, Positive, Unit
 
@@ -50,7 +50,7 @@ class SoilCurves:
         damping = array("SoilCurves", "damping", self.damping, strain.shape)
         if len(strain) < 2 or strain[0] <= 0.0 or np.any(np.diff(strain) <= 0.0):
             raise InputError(
-                f"SoilCurves: strain of '{self.name}' is {shown(self.strain)}; give two or more "
+                f"SoilCurves: strain of '{self.name}' is {quote(self.strain)}; give two or more "
                 "rising numbers above zero"
             )
         if (
@@ -59,13 +59,13 @@ class SoilCurves:
             or not LINEAR <= reduction[0] <= 1.0
         ):
             raise InputError(
-                f"SoilCurves: reduction of '{self.name}' is {shown(self.reduction)}; give G/Gmax "
+                f"SoilCurves: reduction of '{self.name}' is {quote(self.reduction)}; give G/Gmax "
                 f"that falls from 1 (at least {LINEAR:g}) and stays above zero: begin at smaller "
                 "strains"
             )
         if damping.min() < 0.0 or damping.max() >= 0.5:
             raise InputError(
-                f"SoilCurves: damping of '{self.name}' is {shown(self.damping)}; give ratios from "
+                f"SoilCurves: damping of '{self.name}' is {quote(self.damping)}; give ratios from "
                 "0 to less than 1/2, not per cent"
             )
         object.__setattr__(self, "strain", tuple(strain.tolist()))
@@ -73,7 +73,7 @@ class SoilCurves:
         object.__setattr__(self, "damping", tuple(damping.tolist()))
 
     @classmethod
-    @checked
+    @check_arguments
     def linear(
         cls, damping: Annotated[float, NotNegative, RATIO, "the damping ratio"]
     ) -> "SoilCurves":
@@ -98,7 +98,7 @@ class SoilCurves:
         return cls(_TABLES["strain"], table["reduction"], table["damping"], name)
 
     @classmethod
-    @checked
+    @check_arguments
     def vucetic_dobry(
         cls, plasticity: Annotated[float, NotNegative, "the plasticity index [%]"]
     ) -> "SoilCurves":
@@ -126,7 +126,7 @@ class SoilCurves:
         return cls(_TABLES["strain"], reduction, damping, f"Vucetic-Dobry PI {index:g}")
 
     @classmethod
-    @checked
+    @check_arguments
     def darendeli(
         cls,
         *,

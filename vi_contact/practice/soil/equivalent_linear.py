@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
 from ...core.algebra import Array, Comm, SerialComm, largest
-from ...core.arguments import checked
-from ...core.checks import instance, number, optional, refuse, several, shown, whole
+from ...core.arguments import check_arguments
+from ...core.checks import instance, number, optional, quote, refuse, several, whole
 from ...core.errors import InputError, ViContactError
 from ...core.quantities import Positive, Unit
 from ...laws.materials import LinearElastic
@@ -56,7 +56,7 @@ class SiteResponse:
     surface: Record
     iterations: int
 
-    @checked
+    @check_arguments
     def column(
         self,
         *,
@@ -182,7 +182,7 @@ def _check_layers(owner: str, layers: Sequence[Layer]) -> tuple[Layer, ...]:
         for layer in several(owner, "layers", layers, remedy)
     )
     if not checked_layers or any(len(layer) != 3 for layer in checked_layers):
-        raise InputError(f"{owner}: layers is {shown(checked_layers)}; {remedy}")
+        raise InputError(f"{owner}: layers is {quote(checked_layers)}; {remedy}")
     for thickness, material, curves in checked_layers:
         number(owner, "the thickness [m]", thickness, positive=True)
         instance(owner, "the material", material, LinearElastic, remedy)
@@ -201,7 +201,7 @@ def _check_rock(owner: str, rock: LinearElastic | None, rock_damping: float) -> 
     number(owner, "rock_damping", rock_damping, not_negative=True)
     if rock is None and rock_damping not in (0.0, ROCK_DAMPING):
         raise InputError(
-            f"{owner}: rock_damping = {shown(rock_damping)} has no rock to damp; give rock too, or "
+            f"{owner}: rock_damping = {quote(rock_damping)} has no rock to damp; give rock too, or "
             "leave it out"
         )
     if rock is not None and rock.xi:

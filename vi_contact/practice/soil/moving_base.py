@@ -104,7 +104,7 @@ class BaseMotion(GroundFrame):
             lambda t: -ground(t) @ normal,
             lambda t: np.tensordot(ground(t), tangential, axes=1),
         )
-        watched = tuple(nodes.carried(ground) for nodes in surface.watched)
+        watched = tuple(nodes.carry(ground) for nodes in surface.watched)
         return replace(moved, companions=(*surface.companions, self.path), watched=watched)
 
 

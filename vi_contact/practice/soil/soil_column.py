@@ -18,7 +18,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...core.algebra import Array
-from ...core.checks import array, shown
+from ...core.checks import array, quote
 from ...core.errors import InputError
 from ...core.problem import ContactProblem
 from ...core.system import Load
@@ -49,7 +49,7 @@ class SoilColumn:
         n = len(array("SoilColumn", "heights", self.heights, (None,), unit="m")) - 1
         if n < 1 or np.any(np.diff(self.heights) <= 0.0):
             raise InputError(
-                f"SoilColumn: heights is {shown(self.heights)}; give two or more, upwards"
+                f"SoilColumn: heights is {quote(self.heights)}; give two or more, upwards"
             )
         for name in ("lame", "shear", "rho", "alpha", "beta"):
             array("SoilColumn", name, getattr(self, name), (n,))

@@ -7,8 +7,8 @@ from typing import Annotated, Any, Generic, TypeVar
 import numpy as np
 
 from ...core.algebra import Array, largest
-from ...core.arguments import checked
-from ...core.checks import at, refuse
+from ...core.arguments import check_arguments
+from ...core.checks import describe_point, refuse
 from ...core.errors import InputError
 from ...core.quantities import RATIO, Positive, Remedy
 from ...fem import compat
@@ -43,7 +43,7 @@ class StrainCompatible(Generic[T]):
     changes: tuple[float, ...]
 
 
-@checked
+@check_arguments
 def strain_compatible(
     mesh: Any,
     material: Materials,
@@ -151,7 +151,7 @@ def _refuse_strains_beyond_curves(
     for cells, own_curves in pairs:
         if len(cells):
             worst = cells[strain[cells].argmax()]
-            faults.append(own_curves.beyond(strain[worst], f"at {at(middles[worst])}"))
+            faults.append(own_curves.beyond(strain[worst], f"at {describe_point(middles[worst])}"))
     refuse(faults, comm)
 
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from ...beam import Elements
-from ...core.arguments import check
-from ...core.checks import shown
+from ...core.arguments import check_type
+from ...core.checks import quote
 from ...core.errors import InputError, ViContactError
 from ...core.own_files import inner_folder, is_own
 from ...run.files.folder import CHECKPOINT, HISTORY_CSV
@@ -47,7 +47,7 @@ def refine(
     Raises:
         InputError: for a folder without case file or whose run has not finished.
     """
-    check("refine", "folder", folder, str | Path)
+    check_type("refine", "folder", folder, str | Path)
     run = read_run(folder)
     if not is_own(run.folder / COPY):
         raise InputError(
@@ -149,7 +149,7 @@ def _check_number(value: Any, key: str) -> Any:
     if isinstance(value, int | float):
         return value
     raise InputError(
-        f"{key} is {shown(value)}, which has no half: write it as a number in the case, in SI units"
+        f"{key} is {quote(value)}, which has no half: write it as a number in the case, in SI units"
     )
 
 

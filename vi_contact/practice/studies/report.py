@@ -8,9 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ...core.arguments import checked
+from ...core.arguments import check_arguments
 from ...core.errors import InputError, ViContactError
-from ...core.files import sentence, write_output
+from ...core.files import describe_os_error, write_output
 from ...core.own_files import is_own
 from ...core.version import __version__
 from ...run.files.folder import MODEL
@@ -32,7 +32,7 @@ from .refinement import describe_refinement
 WRITERS = {".html": write_web_page, ".pdf": write_pages}
 
 
-@checked
+@check_arguments
 def report(
     folder: str | Path,
     *,
@@ -108,7 +108,7 @@ def _draw_model(folder: Path, picture: Path) -> tuple[dict[str, Any], list[Path]
     except InputError:
         raise
     except OSError as error:
-        raise ViContactError(sentence(error)) from error
+        raise ViContactError(describe_os_error(error)) from error
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         # of what the file says
         reason = " ".join(str(error).split())[:200]
@@ -119,7 +119,7 @@ def _draw_model(folder: Path, picture: Path) -> tuple[dict[str, Any], list[Path]
     return model, [picture]
 
 
-@checked
+@check_arguments
 def comparisons(folder: str | Path) -> tuple[Comparison, ...]:
     """Return the comparisons of a run folder, one for each [[check]] of the case it keeps.
 

@@ -28,8 +28,8 @@ import numpy as np
 from numpy.lib import format as npy
 
 from ...core.algebra import largest
-from ...core.checks import array, number, shown, whole
-from ...core.errors import InputError, of_machine
+from ...core.checks import array, number, quote, whole
+from ...core.errors import InputError, is_of_machine
 from ...core.files import on_root, write_atomically
 from ...core.own_files import is_own, open_to_read
 from ...core.problem import ContactProblem
@@ -295,7 +295,7 @@ def _read(file: Path, problem: ContactProblem) -> tuple[dict[str, Any], Arrays]:
     try:
         about, arrays = _unpack(file)
     except DAMAGE as error:
-        if of_machine(error):
+        if is_of_machine(error):
             raise
         raise _error_of_damage(file, str(error) or type(error).__name__) from error
     check_format(file, about.get("format"))
@@ -375,6 +375,6 @@ def _check_sizes(problem: ContactProblem, about: dict[str, Any], arrays: Arrays)
             shape = (m, problem.surface.tangents.shape[1])
         kind = np.dtype(bool if name == "active" else float)
         if values.dtype != kind or values.shape != shape or not np.all(np.isfinite(values)):
-            raise InputError(f"{shown(name)} is no {shape} array of finite {kind} numbers")
+            raise InputError(f"{quote(name)} is no {shape} array of finite {kind} numbers")
     if shapes:
         raise KeyError(next(iter(shapes)))

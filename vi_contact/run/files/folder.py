@@ -25,23 +25,23 @@ from pathlib import Path
 from typing import Any
 
 from ...core.algebra import Comm
-from ...core.checks import shown
+from ...core.checks import quote
 from ...core.errors import InputError
 from ...core.files import (
     FIELDS,
     FIELDS_INDEX,
     FRAME,
     FRAMES,
+    describe_os_error,
     on_root,
-    sentence,
     to_json,
     write_atomically,
 )
 from ...core.own_files import (
+    count_names,
     inner_folder,
     is_own,
     make_inner_folder,
-    names,
     open_lock,
     open_to_read,
     read_text,
@@ -207,7 +207,7 @@ def check_format(file: Path, number: Any) -> None:
     """Raise InputError for a file of a format, by its number, that this version does not know."""
     if number != FORMAT or isinstance(number, bool):
         raise InputError(
-            f"'{file}' has format {shown(number)} and this version of vi_contact reads {FORMAT}: "
+            f"'{file}' has format {quote(number)} and this version of vi_contact reads {FORMAT}: "
             "read it with the version that wrote it"
         )
 
@@ -222,7 +222,7 @@ def check_folder_format(folder: Path) -> None:
     try:
         number = json.loads(read_text(folder / ABOUT))["format"]
     except OSError as error:
-        raise InputError(sentence(error)) from error
+        raise InputError(describe_os_error(error)) from error
     except (ValueError, TypeError, KeyError, RecursionError) as error:
         # of json, and of what it has read
         raise InputError(
@@ -376,7 +376,7 @@ def _take(folder: Path, name: str) -> Any:
                 folder,
                 error.strerror,
             )
-        if names(file) > 1 and same_file(folder / name, file):
+        if count_names(file) > 1 and same_file(folder / name, file):
             remove(folder / name)  # its other name, a hard link, keeps what it holds
         if same_file(folder / name, file):
             break

@@ -19,10 +19,10 @@ import numpy as np
 
 from ...core.algebra import Array, Indices, from_each
 from ...core.matrix_checks import probe
-from ...core.problem import ContactProblem, with_values
+from ...core.problem import ContactProblem, replace_tuples
 from ...core.step import Scheme
 from ...core.surfaces import ContactSurface
-from ...core.system import SemiDiscreteSystem, history_value
+from ...core.system import SemiDiscreteSystem, evaluate_history
 from ..time_steps import TimeSteps, number_or_words, pieces_of
 
 ROUND_OFF = 1e-6  # of coordinates: SAME of it is a hundred times the last digit of a gap
@@ -71,7 +71,7 @@ def identity(
     early = [start + first * i / EARLY for i in range(EARLY + 1)]
     places = np.arange(SAMPLES)
     times = start + (end - start) * (places + probe(places, 0) + 0.5) / SAMPLES
-    friction = with_values(problem.friction, surface, partial(_of_all_points, surface))
+    friction = replace_tuples(problem.friction, surface, partial(_of_all_points, surface))
     return {
         "unknowns": system.space.unknowns,
         "contact points": surface.total,
@@ -161,7 +161,7 @@ def _loads(
     length = float(np.sqrt(system.algebra.dot(probes[0], probes[0])))
     numbers = [(system.algebra.dot(w, f), size * length) for f in forces for w in probes]
     for vector, history in system.load.separable:
-        values = np.array([float(history_value(history, t)) for t in times])
+        values = np.array([float(evaluate_history(history, t)) for t in times])
         numbers += [_dot(system, probes[0], vector), *_sums_of_row(values)]
     return numbers
 

@@ -13,10 +13,10 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ...core.algebra import Array, Mask
-from ...core.arguments import checked
-from ...core.checks import SHOWN, shown
-from ...core.errors import InputError, of_machine
-from ...core.files import open_hdf5, sentence
+from ...core.arguments import check_arguments
+from ...core.checks import SHOWN, quote
+from ...core.errors import InputError, is_of_machine
+from ...core.files import describe_os_error, open_hdf5
 from ...core.hdf5 import StoredFile
 from ...core.own_files import is_own, open_to_read, read_bytes
 from .folder import COLUMNS, HISTORY_CSV, HISTORY_H5, SUMMARY, check_folder_format
@@ -77,7 +77,7 @@ class RunFolder:
     contact: ContactGeometry | None
 
 
-@checked
+@check_arguments
 def read_run(folder: str | Path) -> RunFolder:
     """Read a run folder of ``simulate``.
 
@@ -112,7 +112,7 @@ def _read_file(path: Path, read: Callable[[Path], T]) -> T:
         raise
     except (OSError, ValueError, KeyError, TypeError, RuntimeError, AttributeError) as error:
         # of json and h5py
-        if of_machine(error):
+        if is_of_machine(error):
             raise
         raise InputError(
             f"a file of the run, '{path}', is missing or damaged ({_short(error)}): restore it"
@@ -151,7 +151,7 @@ def _columns(content: dict[str, Any], history: Mapping[str, Array]) -> dict[str,
         raise ValueError(f"{COLUMNS}: units and meanings are texts")
     for name in history:
         if name not in columns:
-            raise ValueError(f"{COLUMNS} does not know the column {shown(name)}")
+            raise ValueError(f"{COLUMNS} does not know the column {quote(name)}")
     return columns
 
 
@@ -165,10 +165,10 @@ def _facts(facts: dict[str, Any]) -> dict[str, Any]:
     for name, kinds in _KINDS.items():
         value = facts.get(name)
         if value is not None and not _fits(value, kinds):
-            raise ValueError(f"{SUMMARY}: {name} is {shown(value)}")
+            raise ValueError(f"{SUMMARY}: {name} is {quote(value)}")
     mean = (facts.get("iterations_per_step") or {}).get("mean")
     if mean is not None and not _fits(mean, _NUMBER):
-        raise ValueError(f"{SUMMARY}: iterations_per_step is {shown(mean)}")
+        raise ValueError(f"{SUMMARY}: iterations_per_step is {quote(mean)}")
     return facts
 
 
@@ -196,7 +196,7 @@ def _numbers(path: Path) -> dict[str, Array]:
     except InputError:
         raise
     except OSError as error:
-        raise InputError(sentence(error)) from error
+        raise InputError(describe_os_error(error)) from error
     except ValueError as error:
         raise InputError(
             f"'{path}' is damaged ({_short(error)}): restore it or run again"
@@ -241,7 +241,7 @@ def _compare(path: Path, file: StoredFile, history: Mapping[str, Array]) -> None
     """
     for name, numbers in history.items():
         if name not in file or file[name].ndim != 1:
-            raise ValueError(f"{HISTORY_H5}: the column {shown(name)} is missing")
+            raise ValueError(f"{HISTORY_H5}: the column {quote(name)} is missing")
         other = file[name][: len(numbers)]
         own = numbers[: len(other)]
         same = (other == own) | (np.isnan(other) & np.isnan(own))

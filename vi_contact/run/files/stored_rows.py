@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.errors import InputError, of_machine
+from ...core.errors import InputError, is_of_machine
 from ...core.files import open_hdf5
 from ...core.own_files import is_own, open_to_read
 from ...core.step import Row
@@ -190,7 +190,7 @@ class StoredArrays:
             try:
                 self._file = open_hdf5(self._path)
             except OSError as error:  # missing or damaged: the journal may still have all
-                if of_machine(error):
+                if is_of_machine(error):
                     raise
 
     def close(self) -> None:
@@ -225,7 +225,7 @@ class StoredArrays:
             raise
         except (TypeError, KeyError, AttributeError, ValueError, OSError, RuntimeError) as error:
             # h5py's, of damage
-            if of_machine(error):
+            if is_of_machine(error):
                 raise
             return 0
 
@@ -239,7 +239,7 @@ class StoredArrays:
             return block
         except (TypeError, ValueError, OSError, RuntimeError) as error:
             # h5py's, of a file that is damaged
-            if of_machine(error):
+            if is_of_machine(error):
                 raise
             raise InputError(
                 f"'{self._path}' is damaged ({error}): restore it or start a new run"

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array, Comm, SerialComm
-from ...core.checks import shown
+from ...core.checks import quote
 from ...core.errors import InputError, ViContactError
 from ...core.files import open_hdf5
 from ...core.step import Columns, Row
@@ -101,7 +101,7 @@ class Table:
             numeric = isinstance(value, int | float | np.generic | np.ndarray)
             if not numeric or isinstance(value, np.str_):
                 raise InputError(
-                    f"column '{name}' is {shown(value)}: let its recorder return a number or an "
+                    f"column '{name}' is {quote(value)}: let its recorder return a number or an "
                     "array"
                 )
         self._types.update(map(type, row.values()))

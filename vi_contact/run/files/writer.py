@@ -14,7 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ...core.algebra import Array, SerialComm, largest
-from ...core.files import frames_of, on_root, push, to_json, write_atomically
+from ...core.files import list_frames, on_root, push, to_json, write_atomically
 from ...core.problem import ContactProblem
 from ...core.step import Report, Row, State
 from .checkpoint import RestartPoint, write_checkpoint
@@ -120,7 +120,7 @@ class Writer:
         if self._settings is not None:
             kept: Mapping[int, float] = {}
             if self._continued:
-                kept = on_root(self._comm, lambda: times_of(folder, frames_of(folder))) or {}
+                kept = on_root(self._comm, lambda: times_of(folder, list_frames(folder))) or {}
             self._fields = self._settings.open(self._problem, folder, kept)
             if not self._continued:
                 self._fields.write(state, np.zeros_like(state.u))

@@ -39,7 +39,7 @@ from scipy.linalg import block_diag
 
 from ...core.algebra import Array, Indices, Mask
 from ...core.checks import array, column_name, function, instance, mask, optional, provides
-from ...core.corners import tangent_vectors
+from ...core.corners import make_tangent_vectors
 from ...core.errors import InputError
 from ...core.step import AXES
 from ...core.surfaces import ContactSurface
@@ -105,7 +105,7 @@ class Part:
         self.normal, self.whole = self._direction(name, normal), self.weights.sum()
         # run folders do not tell of nodes
         places = np.unique(points, axis=0, return_inverse=True)[1].ravel()
-        self.tangents = tangent_vectors(normals, getattr(geometry, "nodes", places))[chosen]
+        self.tangents = make_tangent_vectors(normals, getattr(geometry, "nodes", places))[chosen]
         self.fit, self.ends = self._fit().T, self._ends(box).T
         lowest, self.tall = float(box[:, -1].min() - self.centre[-1]), float(np.ptp(box[:, -1]))
         self.lowest = lowest if self.tall > DETERMINED * np.ptp(box, axis=0).max() else np.nan

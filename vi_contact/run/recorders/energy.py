@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...core.ledger import Energies, energies, energy_balance
+from ...core.ledger import Energies, compute_energies, energy_balance
 from ...core.problem import ContactProblem
 from ...core.step import Columns, Report, Row, State
 
@@ -53,7 +53,7 @@ class Energy:
         Works and losses are zero, or those of the run that is continued.
         """
         self._problem = problem
-        self._now = energies(problem.equations, state.u, state.v)
+        self._now = compute_energies(problem.equations, state.u, state.v)
         self._stored = self._stored_by_strains(state)
         self._sums = dict.fromkeys(self._SUMS, 0.0)
         if resumed is not None:
@@ -81,7 +81,7 @@ class Energy:
         end = new if new.v is report.v_minus else new.with_velocity(report.v_minus)
         with np.errstate(over="ignore", invalid="ignore"):  # the session refuses overflow
             # The step without its impact: from the energies before it to those of v⁻.
-            free = energies(system, new.u, report.v_minus)
+            free = compute_energies(system, new.u, report.v_minus)
             step = energy_balance(
                 self._problem, report.old, end, report.balance, before=self._now, after=free
             )

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from ...core.algebra import Array
-from ...core.checks import array, column_name, instance, optional, shape_of
+from ...core.checks import array, column_name, find_shape, instance, optional
 from ...core.errors import InputError
 from ...core.problem import ContactProblem
 from ...core.quantities import Unit
@@ -102,7 +102,7 @@ class SectionForces:
         )
         for label, ends in self.cuts.items():
             column_name("section label", label)
-            shape = shape_of(ends)
+            shape = find_shape(ends)
             if len(shape) == 2 and shape not in ((2, 2), (3, 3)):
                 raise InputError(
                     f"SectionForces: section '{label}' has {shape[0]} points of {shape[1]} "

@@ -19,7 +19,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ...core.algebra import Array, Mask
-from ...core.collective import limit_of, slope_of
+from ...core.collective import ask_limit, ask_slope
 from ...core.errors import ViContactError
 from ...core.products import freeze
 from ...core.step import Answers, StepProblem, StepResult
@@ -63,14 +63,14 @@ class CondensedFriction:
 
         # The row of a prescribed tangent is that of a spring as soft as the normal of its node.
         d = 1 + surface.tangents.shape[1]
-        prescribed = np.flatnonzero(~condensed.there)
+        prescribed = np.flatnonzero(~condensed.movable)
         normal = prescribed // d * d
         self.delassus[prescribed, prescribed] = self.delassus.diagonal()[normal]
         self._small = method.prepare(self.delassus, surface.everywhere(surface.bilateral))
 
     def solve(self, step: StepProblem, rigid: Mask) -> StepResult:
         """Return the answer to a step; ``rigid`` (m,) says which supports are. Collective."""
-        answer, held, values = self.reactions(step, self.condensed.free(step.b), rigid)
+        answer, held, values = self.reactions(step, self.condensed.find_free_motion(step.b), rigid)
         x = self.condensed.answer(answer.r.ravel(), held, values)
         mine = self._surface.slots
         r = answer.r[mine]
@@ -107,8 +107,8 @@ class CondensedFriction:
         # All ranks get the problem of all conditions: bounds, and the law with the coefficients of
         # rest.
         rest = step.friction_at(np.zeros_like(step.slip0))
-        cohesion = limit_of(rest, np.zeros(surface.count), surface.weights, step.scale)
-        slope = slope_of(rest, surface.weights)
+        cohesion = ask_limit(rest, np.zeros(surface.count), surface.weights, step.scale)
+        slope = ask_slope(rest, surface.weights)
         columns = np.column_stack([step.bound, step.slip0, cohesion, slope, step.active])
         of_all = surface.everywhere(columns)
         values = of_all[:, :-3]
@@ -141,7 +141,7 @@ class CondensedFriction:
             own: makes the step of one row.
             rigid: (m,) which supports are.
         """
-        free = self.condensed.free(many.b)
+        free = self.condensed.find_free_motion(many.b)
         k = len(free)
         m = len(many.bound)
         d = 1 + self._surface.tangents.shape[1]

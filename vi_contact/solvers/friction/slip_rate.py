@@ -23,7 +23,7 @@ import numpy as np
 
 from ...core.algebra import Array, max_abs
 from ...core.arguments import check_fields
-from ...core.collective import slope_of
+from ...core.collective import ask_slope
 from ...core.errors import StepFailure
 from ...core.protocols import FrictionLaw
 from ...core.quantities import Positive
@@ -87,7 +87,7 @@ class RateIteration:
             answer = solved(mu, answer)
             iterations += answer.iterations
             law = step.friction_at(slip(answer))
-            new = np.asarray(surface.everywhere(slope_of(law, surface.weights)))
+            new = np.asarray(surface.everywhere(ask_slope(law, surface.weights)))
             size = max(max_abs(new), max_abs(mu))
             history.append(max_abs(new - mu) / size if size else 0.0)
             if history[-1] <= self.tolerance:

@@ -18,7 +18,7 @@ from ...core.surfaces import ContactSurface
 CLOSING = 1e-12  # penetration, relative to |x|, that closes a condition at the end of a solve
 
 
-class Contact:
+class ClosedSet:
     """Hold the closed set of one step.
 
     Attributes:

@@ -19,7 +19,7 @@ from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
 from ...laws.friction import project
 from .conjugate_gradients import GMRES_BROKE_DOWN, NOT_A_NUMBER, REASONS, format_residuals
-from .contact import Contact
+from .contact import ClosedSet
 from .friction_krylov import Gmres, TurnedInverse
 from .friction_states import LawOfStep, Limits, States, Tangents
 from .layout import Layout
@@ -58,7 +58,7 @@ class FrictionSolver:
     def __init__(
         self,
         surface: ContactSurface,
-        contact: Contact,
+        contact: ClosedSet,
         layout: Layout,
         diagonal: Array,
         operator: Operator,

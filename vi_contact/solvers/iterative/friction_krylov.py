@@ -21,7 +21,7 @@ from ...core.algebra import Array, Comm, largest
 from ..petsc import PETSc
 from ..volume.snes import Lent
 from .conjugate_gradients import SOLVED, STAGNATED
-from .contact import Contact
+from .contact import ClosedSet
 from .friction_states import States, Tangents, dot
 from .operator import Operator
 from .preconditioners import Masked
@@ -48,7 +48,7 @@ class TurnedInverse(Masked):
         self._tangents = tangents
         self._states: States | None = None
 
-    def apply_states(self, contact: Contact, states: States) -> None:
+    def apply_states(self, contact: ClosedSet, states: States) -> None:
         """Take the mask of the closed set and of the states, and the curvature of the disks."""
         self.weights = contact.weights()
         self.weights[states.held] = 0.0
@@ -89,7 +89,7 @@ class Gmres:
         self,
         comm: Comm,
         operator: Operator,
-        contact: Contact,
+        contact: ClosedSet,
         turned: TurnedInverse,
         patience: int,
     ) -> None:

@@ -25,10 +25,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.algebra import Array, Indices, Mask
-from ...core.collective import limit_of, slope_of
+from ...core.collective import ask_limit, ask_slope
 from ...core.step import StepProblem
 from ...core.surfaces import ContactSurface
-from .contact import Contact
+from .contact import ClosedSet
 
 # kappa over c at most: at the solution kappa multiplies zero, and the matrix stays well conditioned
 STIFFEST = 1e6
@@ -180,7 +180,7 @@ class States:
         across = self.kappa[:, None] * p
         return across + ((self._rise - self.kappa) * along)[:, None] * self.direction
 
-    def apply(self, contact: Contact, p: Array, y: Array) -> None:
+    def apply(self, contact: ClosedSet, p: Array, y: Array) -> None:
         """Make of y = A p the product of p with the matrix of the linear problem, in place.
 
         Args:
@@ -295,4 +295,4 @@ class LawOfStep:
         none = np.zeros(step.surface.count)
         law = step.friction_at(slip)
         weights = step.surface.weights
-        return Limits(limit_of(law, none, weights, step.scale), slope_of(law, weights), none)
+        return Limits(ask_limit(law, none, weights, step.scale), ask_slope(law, weights), none)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ...core.algebra import Array, EffectiveMatrix, Indices, largest, upper_blocks
+from ...core.algebra import Array, EffectiveMatrix, Indices, largest, take_upper_blocks
 from ..petsc import PETSc
 from ..volume.bounded_system import assembled
 
@@ -108,7 +108,7 @@ class Nodewise:
         mat = assembled(self.A) if layout.complete else self.entries()
         indptr, columns, values = mat.getValuesCSR()
         rows = sp.csr_matrix((values, columns, indptr), shape=(layout.size, mat.getSize()[1]))
-        ends, columns, values = upper_blocks(rows, d, mat.getOwnershipRange()[0])
+        ends, columns, values = take_upper_blocks(rows, d, mat.getOwnershipRange()[0])
         arrays = (ends.astype(PETSc.IntType), columns.astype(PETSc.IntType), values)
         sizes = ((layout.size, None), (layout.size, None))
         blocks = PETSc.Mat().createSBAIJ(sizes, d, csr=arrays, comm=mat.comm)

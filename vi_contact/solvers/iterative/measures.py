@@ -10,7 +10,7 @@ import numpy as np
 from ...core.algebra import Array, Comm, max_abs
 from ...core.step import StepProblem
 from ...core.verify import ROUNDING
-from .contact import Contact
+from .contact import ClosedSet
 
 # of the tolerance: estimates may be wrong, and the carried residual is not the one formed afresh
 GOAL = 0.5
@@ -46,7 +46,7 @@ class Measured:
         self._b = max_abs(load)
         self._guess = max_abs(step.guess)
 
-    def __call__(self, contact: Contact, x: Array, residual: Array, load: Array) -> Measures:
+    def __call__(self, contact: ClosedSet, x: Array, residual: Array, load: Array) -> Measures:
         """Return the references at x. Collective.
 
         Args:

@@ -29,7 +29,7 @@ from ..petsc import PETSc
 from ..volume.failures import petsc_failure
 from ..volume.options import OptionLayers
 from .conjugate_gradients import SOLVED, WRONG_SIGNS, ConjugateGradients, cg_failure
-from .contact import Contact
+from .contact import ClosedSet
 from .friction import FrictionSolver
 from .layout import Nodewise
 from .measures import Worth
@@ -153,7 +153,7 @@ class PreparedIterative:
         # The contact set, and how small residuals have to be.
         self._diagonal = np.array(self._blocks.getDiagonal().array_r)
         rows = self._layout.places[surface.owned]
-        self._contact = Contact(surface, scale, rows, self._diagonal, self._layout.missing)
+        self._contact = ClosedSet(surface, scale, rows, self._diagonal, self._layout.missing)
         self._norm: float | None = None  # of D^-½ A D^-½, estimated when it is needed
         self._worth = Worth(surface.comm, 2, settings.tolerance)
 

@@ -18,7 +18,7 @@ import numpy as np
 from ...core.algebra import Array, Comm, Mask, largest, total
 from ...core.step import StepProblem
 from .conjugate_gradients import NOT_A_NUMBER, SOLVED, STAGNATED, WRONG_SIGNS, ConjugateGradients
-from .contact import Contact
+from .contact import ClosedSet
 from .measures import Measured, Worth, largest_free
 from .operator import Operator
 from .preconditioners import Inverse, Masked
@@ -41,7 +41,7 @@ class Search:
         self,
         step: StepProblem,
         b: Array,
-        contact: Contact,
+        contact: ClosedSet,
         *,
         operator: Operator,
         masked: Masked,

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array, Mask, max_abs
-from ...core.collective import limit_of, slope_of
+from ...core.collective import ask_limit, ask_slope
 from ...core.errors import StepFailure
 from ...core.step import StepProblem, StepResult
 from ...laws.friction import project
@@ -80,8 +80,8 @@ class VolumeFriction:
         """
         surface = self._body.surface
         rest = step.friction_at(np.zeros((surface.count, surface.tangents.shape[1])))
-        cohesion = limit_of(rest, np.zeros(surface.count), surface.weights, step.scale)
-        slope = surface.everywhere(slope_of(rest, surface.weights))
+        cohesion = ask_limit(rest, np.zeros(surface.count), surface.weights, step.scale)
+        slope = surface.everywhere(ask_slope(rest, surface.weights))
 
         def solve(mu: Array, before: Solution | None) -> Solution:
             return self._solve_sequence(step, cohesion, mu[surface.slots], before)
@@ -181,7 +181,7 @@ class VolumeFriction:
         surface = self._body.surface
         friction = self._friction
         law = step.friction_at(friction.by_point(solution.slip))
-        limit = limit_of(law, solution.r_n, surface.weights, step.scale)
+        limit = ask_limit(law, solution.r_n, surface.weights, step.scale)
         x = solution.state.z[: self._body.rows]
         stick = (solution.slip == 0.0) & (limit > 0.0)[friction.point]
         x[friction.tangent[stick]] = friction.origin(step)[stick]

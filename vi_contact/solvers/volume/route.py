@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol, cast
 
 from ...core.algebra import EffectiveMatrix
-from ...core.checks import instance, provides, real, shown
+from ...core.checks import instance, provides, quote, real
 from ...core.errors import InputError, StepFailure
 from ...core.problem import ContactProblem
 from ...core.step import StepProblem, StepResult
@@ -81,7 +81,7 @@ class Volume:
         )
         instance("Volume", "prefix", self.prefix, str, "give a text such as 'vi_contact_volume_'")
         if not 0.0 < real(self.tolerance) < 1.0:
-            tolerance = shown(self.tolerance)
+            tolerance = quote(self.tolerance)
             raise InputError(
                 f"Volume tolerance is {tolerance}: give a relative error below 1, such as 1e-9"
             )

@@ -12,7 +12,7 @@ from typing import Annotated, ClassVar
 from ....core.algebra import Array
 from ....core.arguments import check_fields
 from ....core.checks import check_word
-from ....core.quantities import RATIO, Between, Positive, Unit, quantities
+from ....core.quantities import RATIO, Between, Positive, Unit, read_quantities
 
 History = Mapping[str, Array]  # column -> values (rows,)
 Inputs = Mapping[str, tuple[float, str]]  # name -> (value, unit)
@@ -113,7 +113,7 @@ class Check(ABC):
 
     def gather_inputs(self) -> Inputs:
         """Return the fields that the formula takes, without those that are None."""
-        units = quantities(type(self))
+        units = read_quantities(type(self))
         inputs: dict[str, tuple[float, str]] = {}
         for name in self.formula.fields:
             value = getattr(self, name)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ....core.algebra import Array
-from ....core.checks import shown
+from ....core.checks import quote
 from ....core.errors import InputError
 from ..record import Record, canonical_units
 from .at2 import begin_data
@@ -369,7 +369,7 @@ def _read_series(
         whole = [bool(_WHOLE.fullmatch(text.lines[index])) for index in lines]
         if whole[0] and not all(whole):
             raise InputError(
-                f"{text.at(lines[0])}: {shown(text.lines[lines[0]].strip())} are whole numbers and "
+                f"{text.at(lines[0])}: {quote(text.lines[lines[0]].strip())} are whole numbers and "
                 "others are not, so that they may belong to the header; begin lines of the header "
                 "with #"
             )

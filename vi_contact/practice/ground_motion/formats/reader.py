@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ....core.arguments import checked
-from ....core.checks import shown
+from ....core.arguments import check_arguments
+from ....core.checks import quote
 from ....core.errors import InputError
 from ....core.quantities import Positive, Unit
 from ....core.units import STANDARD_GRAVITY
@@ -28,7 +28,7 @@ SHORTEST_STEP = 1e-6
 LONGEST_STEP = 100.0
 
 
-@checked
+@check_arguments
 def read_record(
     path: str | os.PathLike[str],
     units: str | None = None,
@@ -69,7 +69,7 @@ def read_record(
             break
     if channel is not None and reader not in (*SEVERAL, columns):
         raise InputError(
-            f"{text.path}: channel={shown(channel)} was passed but the file holds one record; "
+            f"{text.path}: channel={quote(channel)} was passed but the file holds one record; "
             "leave channel out"
         )
     record = reader.read(text)

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from ....core.algebra import Array
-from ....core.checks import LARGEST, shown
+from ....core.checks import LARGEST, quote
 from ....core.errors import InputError
 from ..record import UNITS, Record, canonical_units
 from .gaps import refuse_fill_values
@@ -188,7 +188,7 @@ class TextFile:
         if isinstance(channel, int) and not isinstance(channel, bool) and channel in numbers:
             return channel - 1
         names = ", ".join(f"{k}: {name or 'unnamed'}" for k, name in enumerate(components, 1))
-        wrong = "" if self.channel is None else f"there is no channel {shown(self.channel)}: "
+        wrong = "" if self.channel is None else f"there is no channel {quote(self.channel)}: "
         count = "1 channel" if len(components) == 1 else f"{len(components)} channels"
         raise InputError(f"{self.path}: {wrong}the file holds {count} ({names}); pass channel=")
 
@@ -358,7 +358,7 @@ class TextFile:
             values.append(self.number(index, field.strip(), where))
             if len(field) < width or field[-1].isspace():
                 raise InputError(
-                    f"{self.at(index)}: {shown(field.strip())}{where} does not end where its "
+                    f"{self.at(index)}: {quote(field.strip())}{where} does not end where its "
                     "columns do, so that a character is missing or too many on the line; get the "
                     "complete file"
                 )
@@ -378,7 +378,7 @@ class TextFile:
         value = float(word.upper().replace("D", "E")) if _NUMBER.fullmatch(word) else math.nan
         if not math.isfinite(value):
             raise InputError(
-                f"{self.at(index)}: {shown(word)}{where} is not a number; correct it or get "
+                f"{self.at(index)}: {quote(word)}{where} is not a number; correct it or get "
                 "another file"
             )
         return value
@@ -415,7 +415,7 @@ class TextFile:
                 exponents = _EXPONENT.findall(word)
                 if zeros and any(len(digits) == 1 for digits in exponents):
                     raise InputError(
-                        f"{self.at(index)}: the exponent of {shown(word)} is shorter than those of "
+                        f"{self.at(index)}: the exponent of {quote(word)} is shorter than those of "
                         "other numbers; a digit was lost, get the complete file"
                     )
 
@@ -433,7 +433,7 @@ class TextFile:
         last_decimals, last_exponent = _style(last)
         if last_decimals < decimals or (exponent and not last_exponent):
             raise InputError(
-                f"{self.at(indices[-1])}: the last number {shown(last)} is cut off, others in its "
+                f"{self.at(indices[-1])}: the last number {quote(last)} is cut off, others in its "
                 f"column have {decimals} decimals{' and an exponent' if exponent else ''}; get the "
                 "complete file"
             )
@@ -497,7 +497,7 @@ def load_text(path: str | os.PathLike[str], **options: Any) -> TextFile:
     """
     name = os.fspath(path)
     if "\0" in name:
-        raise InputError(f"{shown(name)}: a path cannot contain the character NUL; correct it")
+        raise InputError(f"{quote(name)}: a path cannot contain the character NUL; correct it")
     try:
         with open(name, "rb") as file:
             data = file.read(BYTES + 1)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ....core.algebra import Array
-from ....core.checks import counted, number
+from ....core.checks import check_count, number
 from ....core.errors import InputError
 from .text import SAME_STEP, TextFile
 
@@ -73,7 +73,7 @@ def time_step(
         )
     dt = number("read_record", "resample_dt", text.resample_dt, positive=True, unit="seconds")
     step = dt / math.ceil(dt / usual * (1.0 - SAME_STEP))
-    counted("read_record", f"resample_dt = {dt!r} s", (times[-1] - times[0]) / step)
+    check_count("read_record", f"resample_dt = {dt!r} s", (times[-1] - times[0]) / step)
     return step, SAME_STEP, True
 
 

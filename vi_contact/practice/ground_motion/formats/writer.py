@@ -2,7 +2,7 @@
 
 import os
 
-from ....core.arguments import checked
+from ....core.arguments import check_arguments
 from ....core.errors import InputError
 from ....core.files import write_output
 from ..record import UNITS, Record, canonical_units
@@ -12,7 +12,7 @@ from ..record import UNITS, Record, canonical_units
 DIGITS = 9
 
 
-@checked
+@check_arguments
 def write_columns(record: Record, path: str | os.PathLike[str], units: str) -> None:
     """Write time and acceleration after comment lines "#" with title, units, step and notes.
 
@@ -32,7 +32,7 @@ def write_columns(record: Record, path: str | os.PathLike[str], units: str) -> N
     _write(path, header + rows)
 
 
-@checked
+@check_arguments
 def write_at2(record: Record, path: str | os.PathLike[str], units: str = "g") -> None:
     """Write PEER AT2: four header lines with units, NPTS and DT, then five values a row.
 
@@ -53,7 +53,7 @@ def write_at2(record: Record, path: str | os.PathLike[str], units: str = "g") ->
     _write(path, header + rows)
 
 
-@checked
+@check_arguments
 def write_path_series(record: Record, path: str | os.PathLike[str], units: str) -> None:
     """Write one value a line, for `timeSeries Path -filePath` of OpenSees, which needs -dt.
 

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ....core.arguments import check
+from ....core.arguments import check_type
 from ....core.errors import InputError
 from ....core.files import on_root
 from ....core.problem import ContactProblem
@@ -486,7 +486,7 @@ def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence
             table, type or key that nobody knows (with the nearest known), a missing key, a value of
             the wrong kind, and a choice that nothing reads.
     """
-    check("read_case", "path", path, str | Path)
+    check_type("read_case", "path", path, str | Path)
     path = Path(path)
     tables = read_toml(path)
     case = _read_tables(path, with_settings(tables, settings), settings, allow)

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ....core.algebra import Array
-from ....core.checks import shown
+from ....core.checks import quote
 from ....core.errors import InputError
 
 LENGTH = 500  # characters of a text, at most
@@ -193,7 +193,7 @@ def check_axes(node: Any, d: int, source: str) -> None:
     for expression in expressions if isinstance(expressions, tuple) else (expressions,):
         if isinstance(expression, Expression) and expression.used & beyond:
             raise InputError(
-                f"{source} {shown(expression.text)} has {min(expression.used & beyond)}, and a "
+                f"{source} {quote(expression.text)} has {min(expression.used & beyond)}, and a "
                 f"model of dimension {d} has only {', '.join('xyz'[:d])}: use these only"
             )
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ....core.algebra import Comm, SerialComm
-from ....core.checks import shown
+from ....core.checks import quote
 from ....core.errors import InputError
 from ....core.files import on_root, write_atomically
 from ....core.own_files import is_own, read_bytes
@@ -45,7 +45,7 @@ def copy_starter(name: str, folder: Path) -> list[Path]:
     """
     if name not in list_starters():
         raise InputError(
-            f"there is no starter case {shown(name)}: {suggest_nearest(name, list_starters())}"
+            f"there is no starter case {quote(name)}: {suggest_nearest(name, list_starters())}"
         )
     files = sorted(STARTERS.glob(f"{name}.*"), reverse=True)  # the case file before its mesh
     copies = {folder / file.name: file.read_bytes() for file in files}
@@ -72,7 +72,7 @@ def locate(case: str) -> Path:
     if case not in list_builtin_cases():
         nearest = suggest_nearest(case, list_builtin_cases())
         raise InputError(
-            f"there is no built-in case {shown(case)}: {nearest}; a file ends in .toml"
+            f"there is no built-in case {quote(case)}: {nearest}; a file ends in .toml"
         )
     return FOLDER / f"{case}.toml"
 
@@ -82,7 +82,7 @@ def check_format(path: Path, tables: Mapping[str, Any]) -> None:
     number = tables.get("format", FORMAT)
     if number != FORMAT or isinstance(number, bool):
         raise InputError(
-            f"{path}: format is {shown(number)}, and this version of vi_contact reads format "
+            f"{path}: format is {quote(number)}, and this version of vi_contact reads format "
             f"{FORMAT}: use the version that it was written for, or correct the number"
         )
 

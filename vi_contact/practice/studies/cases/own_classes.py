@@ -19,7 +19,7 @@ from importlib import import_module
 from inspect import Parameter, getattr_static, isfunction, signature
 from typing import Any
 
-from ....core.checks import shown
+from ....core.checks import quote
 from ....core.errors import InputError
 from .table_calls import Callee, Spot, make_callee
 
@@ -35,7 +35,7 @@ def check_packages(names: Iterable[str]) -> tuple[str, ...]:
     for name in allowed:
         if not isinstance(name, str) or not _PACKAGE.fullmatch(name):
             raise InputError(
-                f"--allow {shown(name)}: give the name of a Python package, such as mypackage"
+                f"--allow {quote(name)}: give the name of a Python package, such as mypackage"
             )
     return allowed
 
@@ -55,7 +55,7 @@ def find_own_class(text: str, kinds: Sequence[Any], allowed: Sequence[str], spot
     match = _CLASS.fullmatch(text)
     if match is None:
         raise spot.make_table_error(
-            f"has the type {shown(text)}: give package.module:Name, in plain letters, digits and "
+            f"has the type {quote(text)}: give package.module:Name, in plain letters, digits and "
             "underscores"
         )
     protocols = [kind for kind in kinds if is_protocol(kind)]

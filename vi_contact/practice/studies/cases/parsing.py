@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, get_args, get_origin
 
 from ....core.arguments import members_of
-from ....core.checks import SHOWN, shown
+from ....core.checks import SHOWN, quote
 from ....core.errors import InputError
 from ....core.renamed import WORDS
 from .own_classes import find_own_class
@@ -261,7 +261,7 @@ def _show(value: Any) -> str:
     """Return a value as in the file."""
     if isinstance(value, bool):
         return str(value).lower()
-    return f"'{value[:SHOWN]}'" if isinstance(value, str) else shown(value)
+    return f"'{value[:SHOWN]}'" if isinstance(value, str) else quote(value)
 
 
 _SCALARS = {float: "a number", int: "a whole number", bool: "true or false", str: "text"}

@@ -12,7 +12,7 @@ from importlib.resources import files
 from typing import Any, get_origin
 
 from ....core.algebra import Array
-from ....core.checks import shown
+from ....core.checks import quote
 from ....core.errors import InputError
 from .expressions import LENGTH, Expression, Places
 from .table_calls import Spot
@@ -60,7 +60,7 @@ def read_quantity(text: str, members: Sequence[Any], spot: Spot) -> Any:
         value = float(expression())
         if not math.isfinite(value) or (float not in members and value != int(value)):
             raise spot.make_error(
-                f"is {shown(text)}, which is {value:g}: give a finite number, a whole one of things"
+                f"is {quote(text)}, which is {value:g}: give a finite number, a whole one of things"
             )
         return value if float in members else int(value)
     return Places(expression) if kind == FIELD else expression
@@ -126,19 +126,19 @@ def _read_expression(text: str, letters: str, spot: Spot) -> Expression:
             return Expression(text, letters)
         number, unit = match.groups()
         if spot.unit is None:
-            raise InputError(f"no unit is known for it here: leave {shown(unit)} out")
+            raise InputError(f"no unit is known for it here: leave {quote(unit)} out")
         factor, dimension = _read_unit(unit)
         own_factor, own_dimension = _read_unit(spot.unit)
         if dimension != own_dimension:
             proper = "% or as a plain number" if spot.unit == "1" else spot.unit
-            raise InputError(f"{shown(unit)} is not a unit of it: give it in {proper}")
+            raise InputError(f"{quote(unit)} is not a unit of it: give it in {proper}")
         return Expression(repr(float(number) * (factor / own_factor)))
     except InputError as error:
         variables = f" of {', '.join(letters)}" if letters else ""
         remedy = ""
         if match is None:
             remedy = f"give a number, one with its unit, or arithmetic{variables}; "
-        raise spot.make_error(f"is {shown(text)}: {remedy}{error}") from None
+        raise spot.make_error(f"is {quote(text)}: {remedy}{error}") from None
 
 
 def _read_unit(text: str) -> tuple[float, Dimension]:
@@ -153,7 +153,7 @@ def _read_unit(text: str) -> tuple[float, Dimension]:
     while position < len(text):
         match = _FACTOR.match(text, position)
         if match is None:
-            raise InputError(f"{shown(text)} is not a unit: write one as kN/m3, cm/s^2 or Pa*s")
+            raise InputError(f"{quote(text)} is not a unit: write one as kN/m3, cm/s^2 or Pa*s")
         sign, name, digits, raised = match.groups()
 
         # The power of this factor, from "2", "^2" or "²"; negative below a "/".
@@ -163,7 +163,7 @@ def _read_unit(text: str) -> tuple[float, Dimension]:
             power = -power
         if name not in _UNITS:
             known = ", ".join((*_TABLES["with_prefix"], *_TABLES["alone"]))
-            raise InputError(f"{shown(name)} is not a unit here: there are {known}, kPa, mm")
+            raise InputError(f"{quote(name)} is not a unit here: there are {known}, kPa, mm")
 
         factor, *dimension = _UNITS[name]
         size *= factor**power

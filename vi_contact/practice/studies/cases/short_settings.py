@@ -9,7 +9,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from ....core.checks import shown
+from ....core.checks import quote
 from ....core.errors import InputError
 from .bodies import find_body_table
 from .parsing import suggest_nearest
@@ -83,7 +83,7 @@ class ShortOptions:
         axes = len(direction) if isinstance(direction, list) else _count_axes(tables)
         if not all(files) or len(files) > 2:
             raise InputError(
-                f"--motion {shown(self.motion)}: give FILE, or FILE,FILE with a vertical motion"
+                f"--motion {quote(self.motion)}: give FILE, or FILE,FILE with a vertical motion"
             )
 
         # The first record goes along the first axis, the second along the last one.
@@ -236,5 +236,5 @@ def _name_method(kind: str, name: str, methods: Mapping[str, Sequence[str]]) -> 
             return format_value({"type": owner, "method": {"type": name}})
     if name not in methods and ":" not in name:
         known = [*methods, *chain(*methods.values())]
-        raise InputError(f"unknown {kind} {shown(name)}: {suggest_nearest(name, known)}")
+        raise InputError(f"unknown {kind} {quote(name)}: {suggest_nearest(name, known)}")
     return format_value({"type": name})

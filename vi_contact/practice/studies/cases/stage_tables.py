@@ -10,7 +10,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from ....core.checks import flag, shown
+from ....core.checks import flag, quote
 from ....core.errors import InputError
 from .parsing import suggest_nearest
 
@@ -103,9 +103,9 @@ def _read_stage(label: str, own: Mapping[str, Any], tables: Mapping[str, Any]) -
     kind = own.get("type")
     release = own.get("release", False)
     if not isinstance(name, str) or not _NAME.fullmatch(name):
-        raise InputError(f"{label} has name = {shown(name)}: give letters, digits and underscores")
+        raise InputError(f"{label} has name = {quote(name)}: give letters, digits and underscores")
     if kind not in ("static", "dynamic"):
-        raise InputError(f'{label} has type = {shown(kind)}: give "static" or "dynamic"')
+        raise InputError(f'{label} has type = {quote(kind)}: give "static" or "dynamic"')
     flag(label, "release", release)
     whole = {key: value for key, value in tables.items() if key != "stage"}
     for key in BY_KEY:
@@ -126,7 +126,7 @@ def _read_stage(label: str, own: Mapping[str, Any], tables: Mapping[str, Any]) -
 def _replace_keys(label: str, key: str, table: Any, own: Any) -> dict[str, Any]:
     """Return [system] or [run] of the case, with the keys that a stage replaces."""
     if not isinstance(own, dict) or not isinstance(table, dict):
-        raise InputError(f"{label}: {key} is {shown(own)}: give a table, here and in the case")
+        raise InputError(f"{label}: {key} is {quote(own)}: give a table, here and in the case")
     # One of these ends a run: a stage that gives one does without the other of the case.
     ends = {"steps", "t_end"}
     replaced = ends if ends & own.keys() else set()

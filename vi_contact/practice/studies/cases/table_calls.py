@@ -19,7 +19,7 @@ from inspect import Parameter, signature
 from typing import Any
 
 from ....core.errors import InputError
-from ....core.quantities import Quantity, quantities
+from ....core.quantities import Quantity, read_quantities
 
 Context = Mapping[str, Any]
 # What has been read: a Group or Call, a tuple or dict of nodes; all else stands for itself.
@@ -161,7 +161,7 @@ def make_callee(
     """
     # A plain class has its annotations at __init__, a dataclass at its fields.
     plain_class = isinstance(function, type) and not is_dataclass(function)
-    quantity_of = quantities(function.__init__ if plain_class else function)  # type: ignore[misc]
+    quantity_of = read_quantities(function.__init__ if plain_class else function)  # type: ignore[misc]
 
     # Parameters that collect others, such as *args, have no key.
     collecting = (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD)

@@ -12,7 +12,7 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
-from ....core.checks import shown
+from ....core.checks import quote
 from ....core.errors import InputError
 
 BYTES = 10_000_000  # of a case file, at most
@@ -116,7 +116,7 @@ def with_settings(tables: dict[str, Any], settings: Sequence[str]) -> dict[str, 
     for setting in settings:
         key, equals, value = setting.partition("=")
         if key.count(".") > DEPTH:
-            raise InputError(f"setting {shown(setting)} {_TOO_DEEP}")
+            raise InputError(f"setting {quote(setting)} {_TOO_DEEP}")
         if not equals or not key.strip():
             raise InputError(f"setting '{setting}': give KEY=VALUE, such as friction.mu=0.5")
         new = _read_value(value.strip()) if value.strip() else None
@@ -131,9 +131,9 @@ def _read_value(text: str) -> Any:
     except tomllib.TOMLDecodeError:
         return text
     except RecursionError:
-        raise InputError(f"setting {shown(text)} {_TOO_DEEP}") from None
+        raise InputError(f"setting {quote(text)} {_TOO_DEEP}") from None
     except ValueError as error:
-        raise InputError(f"setting {shown(text)} {_explain_value_error(error)}") from None
+        raise InputError(f"setting {quote(text)} {_explain_value_error(error)}") from None
     # A text of several lines may hold keys of its own.
     return tables["value"] if set(tables) == {"value"} else text
 

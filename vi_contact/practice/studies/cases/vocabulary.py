@@ -25,7 +25,7 @@ from ....core import (
     Scheme,
     Solver,
 )
-from ....core.arguments import checked
+from ....core.arguments import check_arguments
 from ....core.corners import FEATURE_ANGLE
 from ....core.quantities import RATIO, Positive, Unit
 from ....core.system import SemiDiscreteSystem
@@ -242,7 +242,7 @@ def first_mode_harmonic(
     )
 
 
-@checked
+@check_arguments
 def first_mode_period(system: SemiDiscreteSystem, *, parts: Annotated[float, Positive]) -> float:
     """Return the time step that divides the body's longest period into so many parts [s]."""
     return 1.0 / (parts * engineering.lowest_frequency(system))

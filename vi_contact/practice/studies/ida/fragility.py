@@ -25,7 +25,7 @@ from scipy.optimize import minimize
 from scipy.special import log_ndtr, ndtr
 
 from ....core.algebra import Array
-from ....core.arguments import checked
+from ....core.arguments import check_arguments
 from ....core.errors import InputError
 from .measures import Demand, read_demand
 
@@ -118,7 +118,7 @@ class Fragility:
         return np.asarray(ndtr(z + np.outer([-1.0, 0.0, 1.0], size)))
 
 
-@checked
+@check_arguments
 def fragility_curve(brackets: Array) -> Fragility:
     """Return the fragility of brackets, by maximum likelihood.
 

@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from ....core.algebra import Array, SerialComm
-from ....core.arguments import check_fields, checked
+from ....core.arguments import check_arguments, check_fields
 from ....core.errors import InputError
 from ....core.files import to_json, write_atomically, write_csv
 from ....core.own_files import inner_folder, is_own
@@ -165,7 +165,7 @@ class IDA:
         return OneRun(self.case, shaking, factor, folder)
 
 
-@checked
+@check_arguments
 def run_ida(
     study: IDA,
     out: str | Path,

@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ....core.arguments import checked
+from ....core.arguments import check_arguments
 from ....core.errors import InputError
 from ....core.files import to_json, write_atomically
 from ....core.own_files import inner_folder, make_inner_folder
@@ -93,7 +93,7 @@ def gather_ground_motions(case: Case) -> list[tuple[str, Mapping[str, Any]]]:
     return motions
 
 
-@checked
+@check_arguments
 def record_set(word: str) -> list[list[str]]:
     """Return the files of each record of a text.
 
