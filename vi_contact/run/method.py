@@ -152,7 +152,10 @@ def with_defaults(
 def check_solver(owner: str, value: Any, meaning: str = "solver") -> None:
     """Raise InputError unless ``value`` is a solver of steps.
 
-    ``owner`` and ``meaning`` say in the sentence whose argument it is, and which.
+    Args:
+        owner: the function or class whose argument it is, for the sentence.
+        value: what the user gave.
+        meaning: what it should be, for the sentence.
     """
     provides(
         owner,

@@ -210,7 +210,10 @@ class StoredArrays:
         parts = [self._from_hdf5(first, n)] if n else []
         if n < len(steps):
             parts.append(self._from_journal(steps[n:]))
-        return {name: np.concatenate([part[name] for part in parts]) for name in self._samples}
+        block: Block = {}
+        for name in self._samples:
+            block[name] = np.concatenate([part[name] for part in parts])
+        return block
 
     def _count_in_hdf5(self, first: int, steps: Array) -> int:
         """Return how many of the rows history.h5 has, all of the right shape."""

@@ -97,7 +97,13 @@ class Contact:
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Row:
-        """Return the row of the initial contact: of a gravity stage, or open."""
+        """Return the row of the initial contact: of a gravity stage, or open. Collective.
+
+        Args:
+            problem: what is marched.
+            state: the first state.
+            resumed: the last row of the run that is continued, None for a new run.
+        """
         surface = problem.surface
         self._problem = problem
         self._frictional = problem.frictional

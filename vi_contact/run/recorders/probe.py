@@ -66,7 +66,16 @@ class Probe:
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Row:
-        """Find the nodes."""
+        """Find the nodes; return the row of the first state. Collective.
+
+        Args:
+            problem: what is marched.
+            state: the first state.
+            resumed: the last row of the run that is continued, None for a new run.
+
+        Raises:
+            InputError: a point has another dimension than the body, or is outside it.
+        """
         self._problem = problem
         dimension = problem.system.space.dimension
         points = np.array(list(self.points.values()), dtype=float)

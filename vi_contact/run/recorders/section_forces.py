@@ -138,6 +138,14 @@ class SectionForces:
         """Find the cuts; return the row of the state at rest, of a static stage for example.
 
         Collective.
+
+        Args:
+            problem: what is marched.
+            state: the first state.
+            resumed: the last row of the run that is continued, None for a new run.
+
+        Raises:
+            InputError: a cut does not go through the cells.
         """
         work = self._work = NodalWork("section forces", problem, self.loads, self.gravity)
         cuts = [find_cut(work.space, label, ends, self.cells) for label, ends in self.cuts.items()]

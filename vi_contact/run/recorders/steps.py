@@ -47,7 +47,13 @@ class Steps:
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Row:
-        """Return the initial row: no iterations and no certificate were needed, so zeros."""
+        """Return the initial row: no iterations and no certificate were needed, so zeros.
+
+        Args:
+            problem: what is marched.
+            state: the first state.
+            resumed: the last row of the run that is continued, None for a new run.
+        """
         self._problem = problem
         self._axes = AXES[: problem.system.influence.shape[1]]
         self._names = tuple(self.columns())
