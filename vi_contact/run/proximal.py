@@ -29,7 +29,7 @@ from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
 from ..core.step import Solver, StepProblem, StepResult
 from ..core.verify import kkt_residual
-from ..solvers.correction import MARGIN, add, kept_reactions, left_over, share_of
+from ..solvers.correction import MARGIN, add, choose_share, keep_reactions, pose_remainder
 from .rigid_bodies import RigidBodies, body_springs
 
 ITERATIONS = 200
@@ -207,7 +207,7 @@ class Proximal:
             # not help.
             last = share
             helped = again or last == 1.0 or worst < 0.5 * before
-            share = share_of(worst) if helped else min(1.0, MARGIN * last)
+            share = choose_share(worst) if helped else min(1.0, MARGIN * last)
             again = share < last == 1.0
             before = worst
             answer = result
@@ -248,10 +248,10 @@ class Proximal:
             centre: from where the springs pull (n,) [m].
             carried: resultants that the step before left (n,) [N].
         """
-        left = left_over(self.step, answer, share)
+        left = pose_remainder(self.step, answer, share)
         x = answer.x
         surface = self.step.surface
-        r_n, r_t = kept_reactions(self.step, answer, share)
+        r_n, r_t = keep_reactions(self.step, answer, share)
         forces = self.step.b - surface.reaction_load(r_n, len(x), r_t)
         b = (
             left.b

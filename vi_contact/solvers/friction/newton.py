@@ -34,7 +34,7 @@ from ...kernels.friction_sweeps import FrictionSweeps
 from .linear import Factored, LinearProblems, States
 from .nsgs import make_sweep
 from .problem import (
-    Iterated,
+    LastIterate,
     PreparedFriction,
     ScaledDelassus,
     ScaledProblem,
@@ -85,7 +85,7 @@ class FrictionNewton(Settings):
         factors: Factors,
         step: ScaledProblem,
         r: Array,
-    ) -> Iterated:
+    ) -> LastIterate:
         """Sweep, and let Newton end it; where Newton goes in circles, sweep and begin anew.
 
         Args:
@@ -97,13 +97,13 @@ class FrictionNewton(Settings):
         """
         history: list[float] = []
         if not step.unit > 0.0:
-            return Iterated(r, 0, history)
+            return LastIterate(r, 0, history)
         w = None
         if loops and short is not None:
             r, w, left = sweep_in_stages(loops, short, step, r)
             history.append(left / step.unit)
             if step.delassus.dimension > 2 and left <= step.rounding(r):
-                return Iterated(r, 1, history)
+                return LastIterate(r, 1, history)
         sweeps = 0
         for attempt in range(ATTEMPTS):
             y = r - (step.w(r) if w is None else w)
@@ -120,7 +120,7 @@ class FrictionNewton(Settings):
                 if not step.delassus.symmetric and not step.rounding(r) <= step.unit:
                     r = np.zeros_like(r)
                     break
-        return Iterated(r, len(history) + sweeps, history)
+        return LastIterate(r, len(history) + sweeps, history)
 
     def _newton(
         self, factors: Factors, step: ScaledProblem, y: Array, history: list[float]

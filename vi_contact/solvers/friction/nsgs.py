@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.algebra import Array, Mask
-from .problem import Iterated, PreparedFriction, ScaledDelassus, ScaledProblem, Settings
+from .problem import LastIterate, PreparedFriction, ScaledDelassus, ScaledProblem, Settings
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class NSGS(Settings):
         """Check and scale G (m d, m d); ``bilateral`` (m,) says which rows are bilateral."""
         return PreparedFriction(self, self.tolerance, ScaledDelassus(G, bilateral), self._loop)
 
-    def _loop(self, step: ScaledProblem, r: Array) -> Iterated:
+    def _loop(self, step: ScaledProblem, r: Array) -> LastIterate:
         """Sweep from r until the residual is small, or rounding."""
         sweep = make_sweep(step)
         history: list[float] = []
@@ -51,7 +51,7 @@ class NSGS(Settings):
             goal = max(self.tolerance * step.unit, step.rounding(r))
             if not np.isfinite(residual) or residual <= goal:
                 break
-        return Iterated(r, len(history), history)
+        return LastIterate(r, len(history), history)
 
 
 def make_sweep(step: ScaledProblem) -> Callable[[Array], Array]:

@@ -36,14 +36,14 @@ from ...core.checks import provides
 from ...core.errors import InputError, StepFailure
 from ...core.quantities import Positive
 from ...laws.friction import project
-from ..normal.lcp import EPS, check_gap, energy_scale, scaled_matrix
+from ..normal.lcp import EPS, check_gap, energy_scale, scale_matrix
 
 FEW = 0.25  # of the unknowns: so many that carry something make a product by rows the faster one
 # of the points that stick: how many times the residual, or its rounding, their slip may be
 STILL = 4.0
 
 
-class Iterated(NamedTuple):
+class LastIterate(NamedTuple):
     """Hold where a method ended."""
 
     r: Array  # (m, d), scaled
@@ -210,19 +210,19 @@ class ScaledProblem:
             self._last[:] = [r.copy(), best * image]
         return r
 
-    def result(self, method: object, tolerance: float, iterated: Iterated) -> FrictionResult:
+    def result(self, method: object, tolerance: float, last: LastIterate) -> FrictionResult:
         """Judge where a method ended, and return the result in newtons.
 
         Args:
             method: its settings.
             tolerance: of the residual, that of r = 0 being 1.
-            iterated: where it ended.
+            last: where it ended.
 
         Raises:
             StepFailure: the residual is above the tolerance and above rounding.
         """
-        iterations = iterated.iterations
-        r = self.admissible(iterated.r)
+        iterations = last.iterations
+        r = self.admissible(last.r)
         w = self.w(r)
         residual = self.residual(r, w)
         unit = self.unit or 1.0
@@ -241,7 +241,7 @@ class ScaledProblem:
             iterations=iterations,
             residual=residual / unit,
             method=method,
-            history=tuple(iterated.history),
+            history=tuple(last.history),
         )
 
 
@@ -283,7 +283,7 @@ class ScaledDelassus:
         self.bilateral = bilateral.copy()
         self.count = m
         self.dimension = d
-        self.matrix, self.norm = scaled_matrix(G, scale.ravel(), unsymmetric=unsymmetric)
+        self.matrix, self.norm = scale_matrix(G, scale.ravel(), unsymmetric=unsymmetric)
         self.symmetric = not unsymmetric or np.array_equal(self.matrix, self.matrix.T)
 
     def product(self, r: Array) -> Array:
@@ -357,7 +357,7 @@ class PreparedFriction:
     method: object
     tolerance: float
     delassus: ScaledDelassus
-    loop: Callable[[ScaledProblem, Array], Iterated]
+    loop: Callable[[ScaledProblem, Array], LastIterate]
 
     def solve(
         self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None

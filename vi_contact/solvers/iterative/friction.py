@@ -130,7 +130,7 @@ class FrictionNewtonStep:
         self.law = LawOfStep(step)
         assert step.slip0 is not None
         self.slip0 = step.slip0
-        self.b = solver.layout.padded(step.b)
+        self.b = solver.layout.pad(step.b)
         self.measured = Measured(step, self.b)
         self.history: list[float] = []
         self.steps = 0
@@ -138,7 +138,7 @@ class FrictionNewtonStep:
         self._rounds = GIVEN
         solver.contact.begin(step)
         solver.inverse.begin()
-        self.x = solver.layout.padded(step.guess)
+        self.x = solver.layout.pad(step.guess)
         self._apply_states(self._predict_states())
 
     def _predict_states(self) -> States:
@@ -365,7 +365,7 @@ class FrictionNewtonStep:
         y_t = self.r_t + tangents.c[:, None] * self.slip
         limit = self.limits(self.r_n)
         still = (np.linalg.norm(y_t, axis=1) <= limit) & (limit > 0.0)
-        x = solver.layout.stripped(self.x)
+        x = solver.layout.strip(self.x)
         held = (solver.surface.tangents >= 0) & still[:, None]
         x[solver.surface.tangents[held]] = self.slip0[held]
         slip = np.where(still[:, None], 0.0, self.slip)

@@ -50,7 +50,7 @@ DEFAULTS: dict[str, Options] = {
 OVERLAP: Options = {"pc_type": "asm", "pc_asm_type": "basic"}  # of one layer
 
 
-def courant(A: EffectiveMatrix) -> float:
+def compute_courant(A: EffectiveMatrix) -> float:
     """Return C; NaN when A does not know what inertia is in it. Collective.
 
     With A = m M + c C + k K the number
@@ -136,7 +136,13 @@ class Masked:
         self._weights = weights * self._shares
 
     def apply(self, _pc: Any, r: Any, z: Any) -> None:
-        """Apply w M⁻¹ w to r, and write it into z: PETSc vectors."""
+        """Apply w M⁻¹ w, as PETSc calls a shell preconditioner.
+
+        Args:
+            _pc: PETSc's preconditioner, whose context this object is.
+            r: the PETSc vector to which it is applied.
+            z: the PETSc vector that gets the result.
+        """
         np.multiply(self.weights, r.array_r, out=self._r.array)
         self._inverse.apply(self._r, z)
         z.array[:] *= self.weights
@@ -302,7 +308,7 @@ def rigid_modes(
         unknowns = surface.in_frames(mode)  # T⁻¹ u
         if surface.coupling is not None:
             unknowns = 2.0 * unknowns - surface.coupling @ unknowns  # R⁻¹ = 2 - R
-        vector.array[:] = layout.padded(unknowns)
+        vector.array[:] = layout.pad(unknowns)
     return orthonormalise(vectors)
 
 

@@ -212,7 +212,7 @@ class Indefinite(Exception):
     """Say that A is not positive definite."""
 
 
-def largest_eigenvalue(search: Search, diagonal: Array, rounds: int = 15) -> float:
+def estimate_largest_eigenvalue(search: Search, diagonal: Array, rounds: int = 15) -> float:
     """Return the largest eigenvalue of D⁻¹A, too large by 5 %. Collective.
 
     It is found by power iteration, from below; without the springs.
@@ -234,9 +234,7 @@ def largest_eigenvalue(search: Search, diagonal: Array, rounds: int = 15) -> flo
     return 1.05 * max(value, 1.0)
 
 
-def projected_gradients(
-    search: Search, diagonal: Array, norm: float, x: Array
-) -> tuple[Array, Array, int]:
+def descend(search: Search, diagonal: Array, norm: float, x: Array) -> tuple[Array, Array, int]:
     """Solve a step from x. Collective.
 
     Args:

@@ -28,7 +28,16 @@ from ...core.errors import ViContactError
 from ...core.quantities import Positive
 from ...kernels.compiler import load_loops
 from ...kernels.exchanges import Exchanges
-from .lcp import EPS, Found, LCPResult, PreparedLCP, ScaledLCP, cholesky, failure, scaled_dense
+from .lcp import (
+    EPS,
+    LCPResult,
+    PreparedLCP,
+    ScaledAnswer,
+    ScaledLCP,
+    cholesky,
+    failure,
+    scale_dense,
+)
 
 FEW = 160  # rows up to which compiled exchanges are as fast as those of LAPACK
 KEPT = 2**22  # numbers in the factors of sets that are remembered
@@ -67,7 +76,7 @@ class ActiveSet:
         Raises:
             InputError: G is not symmetric and positive definite.
         """
-        scaled = scaled_dense(G, bilateral)
+        scaled = scale_dense(G, bilateral)
         cholesky(scaled.matrix)  # if the whole is positive definite, so is every part
         return PreparedSets(self, scaled, _Sets(self, scaled).search)
 
@@ -155,7 +164,7 @@ class _Sets:
         self._bilateral = scaled.bilateral
         self._factors: dict[bytes, _Factor] = {}
 
-    def search(self, gap: Array, guess: Array | Mask | None, unit: float) -> Found:
+    def search(self, gap: Array, guess: Array | Mask | None, unit: float) -> ScaledAnswer:
         """Search the set without wrong signs.
 
         Args:
@@ -176,7 +185,7 @@ class _Sets:
         elif residual > self.method.tolerance:
             advice = "G is too ill-conditioned: remove contacts that nearly depend on others"
         else:
-            return Found(r, residual, len(history), history)
+            return ScaledAnswer(r, residual, len(history), history)
         raise failure(self.method, iterations=len(history), residual=residual, advice=advice)
 
     def _exchange(self, active: Mask, gap: Array, history: list[float]) -> tuple[Array, Array]:

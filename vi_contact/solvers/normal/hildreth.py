@@ -18,7 +18,7 @@ from scipy.linalg import lapack
 from ...core.algebra import Array, Mask, max_abs
 from ...core.arguments import check_fields
 from ...core.quantities import Positive
-from .lcp import EPS, Found, PreparedLCP, ScaledLCP, cholesky, failure, scaled_dense
+from .lcp import EPS, PreparedLCP, ScaledAnswer, ScaledLCP, cholesky, failure, scale_dense
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Hildreth:
         Raises:
             InputError: G is not symmetric and positive definite.
         """
-        scaled = scaled_dense(G, bilateral)
+        scaled = scale_dense(G, bilateral)
         return PreparedLCP(self, scaled, _Sweeps(self, scaled).search)
 
 
@@ -80,7 +80,7 @@ class _Sweeps:
             swept = np.arange(bilateral.size)
         self._rows = [(i, self._H[i]) for i in swept.tolist()]
 
-    def search(self, gap: Array, guess: Array | Mask | None, unit: float) -> Found:
+    def search(self, gap: Array, guess: Array | Mask | None, unit: float) -> ScaledAnswer:
         """Sweep until the answer is found.
 
         Args:
@@ -111,7 +111,7 @@ class _Sweeps:
             r = self._reaction(np.array(x), np.array(lower), gradient)
             error = scaled.complementarity(r, gap + scaled.matrix @ r)
             if error <= max(method.tolerance * unit, self._rounding(x, r)):
-                return Found(r, error / unit, sweeps, history)
+                return ScaledAnswer(r, error / unit, sweeps, history)
         advice = "the contacts are strongly coupled: use ActiveSet, or the other form of Hildreth"
         raise failure(method, iterations=method.max_sweeps, residual=error / unit, advice=advice)
 

@@ -26,7 +26,7 @@ from ...core.arguments import check_fields
 from ...core.errors import InputError, StepFailure
 from ...core.matrix_checks import probe
 from ...core.quantities import Positive
-from .lcp import EPS, Found, PreparedLCP, ScaledLCP, failure, scaled_dense
+from .lcp import EPS, PreparedLCP, ScaledAnswer, ScaledLCP, failure, scale_dense
 
 TINY = 1e-11  # of the largest entry of a column: no pivot
 TIED = 1e-13  # ratios that rounding alone may tell apart
@@ -63,7 +63,7 @@ class Lemke:
         Raises:
             InputError: the bilateral rows depend on each other.
         """
-        scaled = scaled_dense(G, bilateral, unsymmetric=True)
+        scaled = scale_dense(G, bilateral, unsymmetric=True)
         return PreparedLCP(self, scaled, _Pivots(self, scaled).search)
 
 
@@ -84,7 +84,7 @@ class _Pivots:
         self._carry = np.linalg.solve(G[np.ix_(b, b)].T, G[:, b].T).T
         self._matrix = G - self._carry @ G[b]
 
-    def search(self, gap: Array, guess: Array | Mask | None, unit: float) -> Found:
+    def search(self, gap: Array, guess: Array | Mask | None, unit: float) -> ScaledAnswer:
         """Try the guessed set, or that of guessed reactions; where it is wrong, pivot.
 
         Args:
@@ -106,7 +106,7 @@ class _Pivots:
             raise failure(
                 self.method, iterations=len(history), residual=residual / unit, advice=advice
             )
-        return Found(r, residual / unit, len(history), history)
+        return ScaledAnswer(r, residual / unit, len(history), history)
 
     def _on_set(self, active: Mask, gap: Array) -> tuple[Array, float]:
         """Return r >= 0 with w = 0 on the set and bilateral rows, and its residual.

@@ -79,17 +79,30 @@ class ScaledStep:
         """Return F(y)."""
         return np.asarray((self.system.apply(y * self.x_ref) - self.b) / self.r_ref)
 
-    def function(self, _solver: Any, y: Any, F: Any) -> None:
-        """Evaluate F(y) as a PETSc callback (SNES function, TAO gradient)."""
+    def write_residual(self, _solver: Any, y: Any, F: Any) -> None:
+        """Evaluate F(y), as PETSc calls the function of a SNES.
+
+        Args:
+            _solver: the SNES.
+            y: the PETSc vector of unknowns.
+            F: the PETSc vector that gets the residual.
+        """
         F.array[:] = self.residual(y.array_r)
 
-    def objective(self, _solver: Any, y: Any, G: Any) -> float:
-        """Return f(y) - f(origin) and write the gradient F(y) into G, for TAO.
+    def write_gradient(self, _solver: Any, y: Any, G: Any) -> float:
+        """Return f(y) - f(origin) and write the gradient F(y) into G, as TAO calls for both.
 
-        f(y) = ½ y·Hy - y·b/r_ref, H = A x_ref / r_ref.
+        f(y) = ½ y·Hy - y·b/r_ref, H = A x_ref / r_ref, so that with dy = y - origin
+
+            f(y) - f(origin) = ½ dy·(F(y) + F(origin))
 
         A line search compares values, which agree in all their digits where the gradient still has
         eight to lose: values are therefore taken from an origin near the answer.
+
+        Args:
+            _solver: the TAO.
+            y: the PETSc vector of unknowns.
+            G: the PETSc vector that gets the gradient.
         """
         values = y.array_r
         F = self.residual(values)

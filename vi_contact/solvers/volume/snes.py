@@ -70,7 +70,7 @@ class SnesDriver:
         self.solver.setOptionsPrefix(layers.prefix)
         self.solver.setType(snes_type)  # before the convergence test, which it would overwrite
         self._first = 0.0
-        self.solver.setFunction(weakly(scaled.function), self._F)
+        self.solver.setFunction(weakly(scaled.write_residual), self._F)
         self.solver.setJacobian(weakly(jacobian.evaluate), jacobian.mat)
         self.solver.setVariableBounds(self._lower, self._upper)
         self.solver.setConvergenceTest(weakly(self._test))
@@ -134,7 +134,7 @@ def weakly(method: Callable[..., Any]) -> Callable[..., Any]:
     return call
 
 
-class Lent:
+class LentContext:
     """Pass an object to PETSc as context, and do not keep it alive: see ``weakly``."""
 
     def __init__(self, lent: Any) -> None:
@@ -168,7 +168,7 @@ class AssembledJacobian:
 
     def __init__(self, system: BoundedSystem) -> None:
         """Make a matrix of the pattern of A. Collective."""
-        self._A = system.assembled()
+        self._A = system.assemble()
         self._own = self._A is not getattr(system.A.matrix, "mat", None)
         self.mat = self._A.duplicate(copy=True)
         self._symmetric = system.symmetric
@@ -182,7 +182,14 @@ class AssembledJacobian:
             self.mat.setOption(PETSc.Mat.Option.SPD, self._symmetric)
 
     def evaluate(self, snes: Any, y: Any, J: Any, P: Any) -> None:
-        """Do nothing: the matrix is constant."""
+        """Do nothing when PETSc calls for a Jacobian: the matrix is constant.
+
+        Args:
+            snes: PETSc's solver, or TAO's.
+            y: the PETSc vector of unknowns.
+            J: PETSc's Jacobian, which is ``mat``.
+            P: the matrix for the preconditioner, the same.
+        """
 
     def _copy(self) -> None:
         """Write H into the matrix."""
@@ -207,7 +214,14 @@ class SemismoothJacobian(AssembledJacobian):
         self._ratio = ratio
 
     def evaluate(self, snes: Any, y: Any, J: Any, P: Any) -> None:
-        """Make a fresh copy."""
+        """Make a fresh copy, as PETSc calls for a Jacobian.
+
+        Args:
+            snes: PETSc's solver, or TAO's.
+            y: the PETSc vector of unknowns.
+            J: PETSc's Jacobian, which is ``mat``.
+            P: the matrix for the preconditioner, the same.
+        """
         self._copy()
         self.mat.setOption(PETSc.Mat.Option.SYMMETRIC, False)
 
