@@ -1,6 +1,12 @@
 """Run the loop over certified steps.
 
-Everything that has to happen when it ends, well or badly, is done here.
+Everything that has to happen when it ends, well or badly, is done here. A run goes this way:
+
+    writer.open -> for every step: march, record -> at the end of a base step: frame, checkpoint if
+    one is due, signals and wall time -> last checkpoint, summary, Solution
+
+``Session.steps`` is a generator that stops after every base step, so that several runs can take
+turns (``simulate_many``). All ranks make the same calls; rank 0 alone writes and logs.
 """
 
 import logging
@@ -42,6 +48,7 @@ from .wall_time import WallTime
 log = logging.getLogger(__name__)
 T = TypeVar("T")
 TIMED = 10_000  # the last steps, of which seconds_per_step is the median
+# why a run ended with an error that has no text of its own
 ENDED: dict[type[BaseException], str] = {
     KeyboardInterrupt: "interrupted by the user",
     GeneratorExit: "its steps were not asked for any more",
@@ -127,10 +134,20 @@ class Session:
     def go(self, writer: Writer) -> Solution:
         """Make the remaining steps, and write everything before, during and after them."""
         with StopSignals() as signals:
+            # None after every base step, the solution in the end.
             return next(filter(None, self.steps(writer, signals)))
 
     def steps(self, writer: Writer, signals: StopSignals) -> Generator[Solution | None, None, None]:
-        """Make the remaining steps; yield None after every base step, the solution in the end."""
+        """Make the remaining steps; yield None after every base step, the solution in the end.
+
+        Args:
+            writer: of the files of the run.
+            signals: those that ask for its end.
+
+        Raises:
+            Interrupted: a signal came; OutOfTime: the wall time is nearly over; StepFailure, or
+                what a function of the user's raised. In all cases what was computed is saved first.
+        """
         begin = time.perf_counter()
         self.halved = self.place.halved
         try:
@@ -141,17 +158,19 @@ class Session:
             self._measure()
             linear = self._seconds_per_linear_step()
         except BaseException as error:
-            # whatever ends a run, what it has is saved; the error is raised again
+            # Whatever ends a run, what it has is saved; the error is raised again.
             interrupted = isinstance(error, KeyboardInterrupt | GeneratorExit)
             status = "interrupted" if interrupted else "failed"
             reason = str(error) or ENDED.get(type(error), type(error).__name__)
             seconds = time.perf_counter() - begin
             everywhere = getattr(error, "on_all_ranks", False)
             self._rescue(writer, status, reason, seconds, all_ranks=everywhere)
-            # on all ranks: none ends before the first has written
+            # A signal ends all ranks: none of them does before the first has written.
             if isinstance(error, Interrupted):
                 self._comm.bcast(None)
             raise
+
+        # The plan has come to its end, or the callback has asked for it.
         status = "stopped" if self.stopped else "finished"
         facts = self._facts(status, self.stopped, time.perf_counter() - begin) | {
             "seconds_per_linear_step": linear
@@ -174,7 +193,11 @@ class Session:
         """Make the steps, record each, and yield after every base step.
 
         A base step is where a frame, a checkpoint and the end of the run may stand; its halves are
-        recorded only.
+        recorded only. The time of a step, for the summary, counts all that is done for it here.
+
+        Args:
+            writer: of the files of the run.
+            signals: those that ask for its end.
         """
         place = self.place
         loop = self.loop or March(
@@ -185,10 +208,13 @@ class Session:
         self.wall_time.begin()
         with closing(Progress(self.left, shown=self.request.progress and self.root)) as progress:
             for state, report in loop:
+                # Every step: a row of the histories.
                 self._record(report, writer)
                 self.dt = loop.dt
                 self.halved = loop.halved
                 worst = max(worst, report.certificate.worst)
+
+                # The end of a base step: a place where the run can be left and continued.
                 if loop.ended:
                     self.place = RestartPoint(
                         state, place.t_start, place.k_start, loop.base, loop.halved
@@ -203,7 +229,9 @@ class Session:
                         )
                 self.seconds.append(time.perf_counter() - begin)
                 if len(self.seconds) == 1:
-                    self._measure()
+                    self._measure()  # the first step has made all factors
+
+                # Who asks for the end: the callback, a signal, or the wall time.
                 if self.request.callback is not None:
                     self._call(self.request.callback, report, writer)
                 if loop.ended and self.stopped:
