@@ -38,9 +38,8 @@ from ...core.quantities import Positive
 from ...laws.friction import project
 from ..normal.lcp import EPS, check_gap, energy_scale, scale_matrix
 
-FEW = 0.25  # of the unknowns: so many that carry something make a product by rows the faster one
-# of the points that stick: how many times the residual, or its rounding, their slip may be
-STILL = 4.0
+FEW = 0.25  # share of the unknowns that carry something, up to which a product by rows is faster
+STILL = 4.0  # how many times the residual, or its rounding, the slip of points that stick may be
 
 
 class LastIterate(NamedTuple):

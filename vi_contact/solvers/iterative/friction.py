@@ -1,12 +1,20 @@
 """Solve a step with friction by semismooth Newton on all unknowns.
 
-Closed normals and sticking tangents are a mask.
+Closed normals and sticking tangents are held: they are a mask on the full-size vectors, and the
+residual in their rows is the reaction, r = b - A x. With the states of the points (open, stick,
+slip) one step of a time scheme goes
 
-Every Newton step solves the linear problem of the present states (``friction_states``) by GMRES
-(``friction_krylov``), to a hundredth of its residual. The first states are those of the reactions
-of the last step, with the slip that the step predicts: A x - b at a predicted x is no contact
-force. In the end every residual is formed afresh; reactions are put on their cone, and tangents
-that stick where they were.
+1. ``_predict_states``: the states of the reactions of the step before, with the slip that this step
+   predicts. A x - b at a predicted x is no contact force, so that it cannot tell them.
+2. ``_apply_states``: put what is held into x, and form the residual.
+3. ``judge``: end where the error is below the goal; the law may take other coefficients.
+4. ``advance``: solve the linear problem of the states (``friction_states``) by GMRES
+   (``friction_krylov``), to a hundredth of its residual; take the states at the new x; go to 2.
+5. ``answer``: reactions are put on their cone, and tangents that stick where they were.
+
+Where the states go in circles, limits or coefficients of friction are given for some rounds: a
+*round* ends where x solves the step with those that are given, and takes new ones. Vectors are
+padded to whole nodes (``layout``).
 """
 
 from typing import NamedTuple
@@ -27,17 +35,16 @@ from .measures import Measured, Worth
 from .operator import Operator
 from .preconditioners import Inverse
 
-SHARE = 1e-2  # of the residual of a linear problem that GMRES may leave
-AHEAD = 0.1  # of what Newton's last step left: it leaves less and less
-# of the largest friction limit: residual at which coefficients that are given are taken anew
-ROUND = 1e-4
-CIRCLES = 15  # Newton steps after which limits are given
-GIVEN = 8  # rounds for which they are at first, and for twice as many every time after
-MOST_GIVEN = 256  # such rounds
-STEPS = 150  # of Newton
+SHARE = 1e-2  # of the residual of a linear problem that GMRES may leave, or less:
+AHEAD = 0.1  # of the factor by which Newton's last step has lowered the residual
+ROUND = 1e-4  # of the largest friction limit: residual at which a round ends
+CIRCLES = 15  # Newton steps after which limits or coefficients are given
+GIVEN = 8  # rounds for which they are at first, and for twice as many every time after,
+MOST_GIVEN = 256  # up to so many
+STEPS = 150  # of Newton, at most
 
 
-class Contacts(NamedTuple):
+class LastContact(NamedTuple):
     """Hold what the next step begins with: reactions and slip of the answer of this one."""
 
     r_n: Array  # (m,)
@@ -92,7 +99,7 @@ class FrictionSolver:
         self.tangents = Tangents(surface, layout.places, diagonal)
         turned = TurnedInverse(inverse.pc, operator.blocks.createVecLeft(), self.tangents)
         self.gmres = Gmres(self.comm, operator, contact, turned, patience)
-        self.last: Contacts | None = None
+        self.last: LastContact | None = None
         self.worth = Worth(surface.comm, 3, tolerance)
 
     def solve(self, step: StepProblem) -> StepResult:
@@ -134,8 +141,8 @@ class FrictionNewtonStep:
         self.measured = Measured(step, self.b)
         self.history: list[float] = []
         self.steps = 0
-        self._newton_steps = 0  # since limits or coefficients were given last
-        self._rounds = GIVEN
+        self._newton_steps = 0  # with the step's own law, since something was given last
+        self._rounds = GIVEN  # for which limits or coefficients are given next
         solver.contact.begin(step)
         solver.inverse.begin()
         self.x = solver.layout.pad(step.guess)
@@ -150,12 +157,16 @@ class FrictionNewtonStep:
         tangents = solver.tangents
         closed = solver.contact.closed
         slip = self._slip_at_x()
+
+        # No reactions are known: y = c slip alone, which would let all points slip.
         if solver.last is None:
             none = np.zeros(len(slip))
             limits = self.law(np.zeros_like(slip), none, none)
             y_t = tangents.c[:, None] * slip
             stuck = closed & (limits.slope > 0.0)
             return States(tangents, limits, (none, y_t), slip, stuck=stuck)
+
+        # y = r + c slip with the last reactions; points that stuck under pressure stick again.
         last = solver.last
         r_n = np.where(closed, last.r_n, 0.0)
         y_t = last.r_t + tangents.c[:, None] * slip
@@ -255,6 +266,7 @@ class FrictionNewtonStep:
         sizes = solver.comm.max(np.where(np.isnan(local), np.inf, local))
         self.error, any_wrong, limit = sizes
 
+        # How small the error has to be, from what x and the reactions have changed by.
         force = self.scales.force
         self.history.append(self.error / force if 0.0 < force < np.inf else self.error)
         if not np.isfinite(self.error):
@@ -266,12 +278,14 @@ class FrictionNewtonStep:
             return True
 
         # An answer with given coefficients or limits need not be exact: the next ones come sooner.
+        # The error with them is another, and is judged at once.
         is_round_done = not any_wrong and self.error <= max(ROUND * limit, self.goal)
         if not self.law.settled and is_round_done:
             self.law.advance(self.slip, self.r_n)
             self.limits = self._limits(self.slip, self.r_n, self.r_t)
             return self.judge()
 
+        # x does not solve the step: refuse, or see to it that Newton does not go in circles.
         if self.steps == STEPS:
             raise self._failure(
                 "the states of friction did not settle", "take a smaller step of time or load"
@@ -350,7 +364,7 @@ class FrictionNewtonStep:
         limits = self._limits(self.slip, y_n, y_t)
         return States(tangents, limits, (y_n, y_t), self.slip, before=self.states), wrong
 
-    def answer(self) -> tuple[StepResult, Contacts]:
+    def answer(self) -> tuple[StepResult, LastContact]:
         """Return the result, and what the next step begins with."""
         solver = self.solver
         contact = solver.contact
@@ -380,7 +394,7 @@ class FrictionNewtonStep:
             history=tuple(self.history),
             aim=solver.tolerance,
         )
-        return result, Contacts(self.r_n, r_t, slip)
+        return result, LastContact(self.r_n, r_t, slip)
 
     def _failure(self, words: str, remedy: str) -> StepFailure:
         """Return the error of a step without an answer, with the history of residuals."""
