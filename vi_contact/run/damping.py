@@ -88,7 +88,7 @@ def _recall_modes(problem: ContactProblem) -> FirstModes | None:
     return None
 
 
-def damping_in_words(problem: ContactProblem, *, unknown: str = "") -> str:
+def describe_damping(problem: ContactProblem, *, unknown: str = "") -> str:
     """Return the damping of a problem as a text: "none", or its law and the ratios of its modes.
 
     The ratios are told if ``first_modes`` has been called before: nothing is computed here.

@@ -23,7 +23,7 @@ from ..core.state_checks import initial_state
 from ..core.step import Report, Scheme, Solver, State
 from ..solvers.certified import TOLERANCE, CertifiedSolver
 from .method import Method, choose_method
-from .time_steps import StepPlan, TimeSteps, step_plan
+from .time_steps import StepPlan, TimeSteps, plan_steps
 
 
 def march(
@@ -71,7 +71,7 @@ def march(
     )
     with together(method.problem.surface.comm):
         state = initial_state(method.problem) if state is None else state
-    return iter(March(method, step_plan(dt, steps, t_end, state.t), state))
+    return iter(March(method, plan_steps(dt, steps, t_end, state.t), state))
 
 
 class March:

@@ -11,7 +11,7 @@ from ..core.algebra import EffectiveMatrix, from_each, total
 from ..core.problem import ContactProblem
 
 
-def memory(problem: ContactProblem, A: EffectiveMatrix | None) -> dict[str, Any]:
+def measure_memory(problem: ContactProblem, A: EffectiveMatrix | None) -> dict[str, Any]:
     """Return peak_bytes, the largest resident memory of every rank so far, and bytes. Collective.
 
     The bytes are, by name and of all ranks together, those of what says how many it has: the
@@ -37,7 +37,7 @@ def memory(problem: ContactProblem, A: EffectiveMatrix | None) -> dict[str, Any]
     return {"peak_bytes": from_each(comm, peak), "bytes": known}
 
 
-def in_words(memory: Mapping[str, Any]) -> str:
+def describe_memory(memory: Mapping[str, Any]) -> str:
     """Return the same in a line, in megabytes."""
     peaks = memory["peak_bytes"]
     known = "".join(f"; {name} {1e-6 * size:.3g}" for name, size in memory["bytes"].items())

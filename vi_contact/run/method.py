@@ -21,7 +21,7 @@ from ..schemes.trapezoidal import Trapezoidal
 from ..schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from ..solvers.automatic import Automatic
 from .loose_bodies import refuse_loose_bodies
-from .time_steps import TimeSteps, step_plan
+from .time_steps import TimeSteps, plan_steps
 
 SCHEME = ("check", "start", "jump", "effective_matrix", "step", "finish", "balance")
 SLACK = 10.0  # of the tolerance, and of the largest displacement: what a state may penetrate
@@ -100,7 +100,7 @@ def choose_method(
     if first is None:
         first = Automatic()
     method = Method(problem, scheme, [first, *escalation], dt, tolerance)
-    size = step_plan(dt, steps, t_end, start_time(owner, state)).dt(0)
+    size = plan_steps(dt, steps, t_end, start_time(owner, state)).dt(0)
     with together(comm):  # what is the user's own may fail on one rank
         method.bind()
         problem.equations.forget_loads()

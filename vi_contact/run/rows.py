@@ -78,7 +78,7 @@ def join_states(states: Sequence[State]) -> State:
     )
 
 
-def own_states(problem: ContactProblem, problems: Sequence[ContactProblem], many: State) -> Each:
+def split_states(problem: ContactProblem, problems: Sequence[ContactProblem], many: State) -> Each:
     """Return the states of the runs, each made when somebody asks for it.
 
     Their problems get to know the products of the rows with M, K and C.
@@ -105,7 +105,7 @@ def own_states(problem: ContactProblem, problems: Sequence[ContactProblem], many
     return Each(own_state)
 
 
-def own_step(problem: ContactProblem, many: StepProblem, row: int) -> StepProblem:
+def split_step(problem: ContactProblem, many: StepProblem, row: int) -> StepProblem:
     """Return the step of one run.
 
     Args:
@@ -141,7 +141,7 @@ class Loads(Load):
         return np.asarray(self.rows(t))
 
 
-def loads_of(problems: Sequence[ContactProblem]) -> Loads:
+def join_loads(problems: Sequence[ContactProblem]) -> Loads:
     """Return the loads of problems on one system.
 
     They differ in what shakes them, by few vectors times histories: the load of the body, which all

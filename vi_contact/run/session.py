@@ -29,20 +29,20 @@ from ..core.collective import call_user, together
 from ..core.errors import InputError, Interrupted, OutOfTime, StepFailure
 from ..core.step import Recorder, Report, Row, State, StepResult
 from ..core.timing import take_report
-from .damping import NOT_COMPUTED, damping_in_words
+from .damping import NOT_COMPUTED, describe_damping
 from .files.checkpoint import RestartPoint
-from .files.identity import identity
-from .files.log import Progress, versions
+from .files.identity import identify
+from .files.log import Progress, list_versions
 from .files.table import Table
 from .files.writer import Writer
 from .march import March
-from .memory import in_words, memory
+from .memory import describe_memory, measure_memory
 from .method import Method
 from .request import RunRequest
 from .sampling import sampling_warning
 from .solution import Solution, energy_warning
 from .stop_signals import StopSignals
-from .time_steps import StepPlan, number_or_words, pieces_of
+from .time_steps import StepPlan, describe_plan, list_pieces
 from .wall_time import WallTime
 
 log = logging.getLogger(__name__)
@@ -116,14 +116,14 @@ class Session:
             "scheme": repr(method.scheme),
             "mass": repr(problem.mass),
             "solver": repr(solver),
-            "dt": number_or_words(method.dt),
+            "dt": describe_plan(method.dt),
             "tolerance": method.tolerance,
             "ranks": self._comm.size,
             "unknowns": problem.system.space.unknowns,
             "contact_points": problem.surface.total,
             "boundaries": list(problem.system.notes),
-            "damping": damping_in_words(problem, unknown=NOT_COMPUTED),
-            "sampling": sampling_warning(problem, max(pieces_of(method.dt))[0]) or "",
+            "damping": describe_damping(problem, unknown=NOT_COMPUTED),
+            "sampling": sampling_warning(problem, max(list_pieces(method.dt))[0]) or "",
         }
 
     @property
@@ -318,9 +318,9 @@ class Session:
     def _measure(self) -> None:
         """Tell how much memory is taken, once all is set up and at the end. Collective."""
         A = None if self.last is None else self.last.step.A
-        self.memory = memory(self.method.problem, A)
+        self.memory = measure_memory(self.method.problem, A)
         if self.root:
-            log.info("%s", in_words(self.memory))
+            log.info("%s", describe_memory(self.memory))
 
     def _checkpoint(self, writer: Writer) -> None:
         """Write a checkpoint of the last base step, unless there is one. Collective."""
@@ -335,7 +335,7 @@ class Session:
         end = start + self.step_plan.length
         # histories of the user's are asked at other times than those of steps
         with together(self._comm):
-            run = identity(method.problem, method.scheme, method.dt, start=start, end=end)
+            run = identify(method.problem, method.scheme, method.dt, start=start, end=end)
         return {"run": run, "span": (start, end)}
 
     def _rescue(
@@ -368,7 +368,8 @@ class Session:
         if not self.root:
             return
         log.info(
-            "versions: %s", ", ".join(f"{name} {version}" for name, version in versions().items())
+            "versions: %s",
+            ", ".join(f"{name} {version}" for name, version in list_versions().items()),
         )
         for name, value in self.settings().items():
             if name != "sampling":
@@ -397,7 +398,7 @@ class Session:
         return {
             "status": status,
             "reason": reason,
-            "versions": versions("h5py"),
+            "versions": list_versions("h5py"),
             **self.settings(),
             "restarted_from_step": self.resumed_from,
             **self.table.facts(),

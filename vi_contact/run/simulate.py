@@ -42,7 +42,7 @@ from .recorders.steps import Steps
 from .request import CrossCheck, RunRequest
 from .session import Session
 from .solution import Solution
-from .time_steps import TimeSteps, step_plan
+from .time_steps import TimeSteps, plan_steps
 from .wall_time import WallTime
 
 __all__ = ["Solution", "simulate"]
@@ -178,7 +178,7 @@ def open_run(
         # The first state: that of the checkpoint, of an earlier stage, or at rest. The scheme adds
         # its memory of earlier steps, which depends on the length of the first one.
         place, checksum = _find_start(request, method, source)
-        plan = step_plan(request.dt, request.steps, request.t_end, place.t_start)
+        plan = plan_steps(request.dt, request.steps, request.t_end, place.t_start)
         with together(comm):
             first = method.scheme.start(method.problem, place.state, plan.dt(place.base))
         place = replace(place, state=first)

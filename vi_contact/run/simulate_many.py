@@ -13,7 +13,7 @@ from typing import Any
 
 from ..core.checks import several
 from ..core.errors import InputError, Interrupted, ViContactError
-from .files.log import turn_of
+from .files.log import give_turn
 from .request import RunRequest
 from .session import Session
 from .simulate import open_run, simulate
@@ -46,7 +46,7 @@ def simulate_many(
             checkpoints: ``restart=True`` continues them.
     """
     given = several("simulate_many", "runs", runs, "give a list of arguments of simulate")
-    requests = [_request(run) for run in given]
+    requests = [_make_request(run) for run in given]
     recorders: list[int] = []
     folders: list[Path] = []
     for request in requests:
@@ -57,7 +57,7 @@ def simulate_many(
             folders.append(Path(request.out).resolve())
     _refuse_shared("recorder", recorders)
     _refuse_shared("folder", folders)
-    return _in_turn(requests, tell)
+    return _simulate_in_turn(requests, tell)
 
 
 def _refuse_shared(kind: str, things: Sequence[Hashable]) -> None:
@@ -69,7 +69,7 @@ def _refuse_shared(kind: str, things: Sequence[Hashable]) -> None:
         )
 
 
-def _request(run: Mapping[str, Any]) -> RunRequest:
+def _make_request(run: Mapping[str, Any]) -> RunRequest:
     """Return the request of a call of ``simulate`` with these arguments, without progress line.
 
     The names are the user's, so the signature of ``simulate`` says here which are known and what is
@@ -106,7 +106,7 @@ class _Turn:
     def step(self) -> Solution | ViContactError | Interrupted | None:
         """Make a base step; return what the run has ended with, None when it goes on."""
         self.begun = True
-        with turn_of(self):
+        with give_turn(self):
             try:
                 return next(self.steps)
             except (ViContactError, Interrupted) as error:
@@ -114,7 +114,7 @@ class _Turn:
 
     def close(self) -> None:
         """End a run that nobody waits for any more, with its checkpoint."""
-        with turn_of(self):
+        with give_turn(self):
             self.steps.close()
         # the matrices of a run that has ended serve nobody
         self.session.last = None
@@ -122,7 +122,9 @@ class _Turn:
         self.loop.prepared.clear()
 
 
-def _in_turn(requests: Sequence[RunRequest], tell: Callable[[float], None]) -> Iterator[Ended]:
+def _simulate_in_turn(
+    requests: Sequence[RunRequest], tell: Callable[[float], None]
+) -> Iterator[Ended]:
     """Make a base step of every run in turn, until all have ended."""
     going: list[_Turn] = []
     stopped: Interrupted | None = None

@@ -24,7 +24,7 @@ from ..core.verify import kkt_residuals
 from ..solvers.certified import NEAR, CertifiedSolver
 from .march import March, after_impact
 from .method import Method
-from .rows import Each, RowReport, join_states, loads_of, own_states, own_step
+from .rows import Each, RowReport, join_loads, join_states, split_states, split_step
 from .time_steps import StepPlan
 
 
@@ -83,7 +83,7 @@ def group_runs(runs: Sequence[Together]) -> None:
         for group in groups:
             first = group[0]
             shared = problem.beside(first.method.problem)
-            if shared is not None and _place_and_method(first) == _place_and_method(run):
+            if shared is not None and _describe_place(first) == _describe_place(run):
                 run.method = replace(run.method, problem=shared)
                 group.append(run)
                 break
@@ -93,7 +93,7 @@ def group_runs(runs: Sequence[Together]) -> None:
         Group(group)
 
 
-def _place_and_method(run: Together) -> tuple[Any, ...]:
+def _describe_place(run: Together) -> tuple[Any, ...]:
     """Return where a run is, and how it goes on."""
     return (
         run.state.t,
@@ -132,7 +132,7 @@ class Group:
             self._problems = [run.method.problem for run in runs]
             first = self._problems[0]
             self._problem = replace(first)
-            self._problem.__dict__["equations"] = first.unshaken.loaded(loads_of(self._problems))
+            self._problem.__dict__["equations"] = first.unshaken.loaded(join_loads(self._problems))
             self._take_states(states)
 
     def _take_states(self, states: list[State]) -> None:
@@ -218,7 +218,7 @@ class Group:
 
         # The solver answers all rows at once, if it can.
         problems = self._problems
-        steps = Each(lambda row: own_step(problems[row], many, row))
+        steps = Each(lambda row: split_step(problems[row], many, row))
         answers = self._solve(many, steps)
         if answers is None:
             return list(runs)
@@ -291,7 +291,7 @@ class Group:
         rows = scheme.finish(self._problem, self._many, many, result, dt)
         for vector in (rows.u, rows.v, *rows.memory.values()):
             freeze(vector)  # what is known of them stays true
-        free = own_states(self._problem, problems, rows)
+        free = split_states(self._problem, problems, rows)
         self._many, self._states = self._apply_impact(rows, free, dt)
         system = self._problem.equations
         loads = [("load", t, t) for t in system.times]

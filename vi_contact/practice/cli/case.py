@@ -184,13 +184,13 @@ def _new(options: argparse.Namespace) -> str:
 def _run(options: argparse.Namespace) -> str:
     import mpi4py.MPI  # noqa: F401  # first: ``world`` finds it
 
-    from ...run.wall_time import seconds_of
+    from ...run.wall_time import parse_wall_time
     from ..studies.cases.case import read_case  # late: finite elements
 
     comm, path = world(), located(options.case)
     timing.show_on_terminal(not options.quiet)
     if options.wall_time is not None:
-        seconds_of(options.wall_time)
+        parse_wall_time(options.wall_time)
     if options.steps is not None and options.steps < 1:
         raise InputError(f"--steps {options.steps}: give at least one step")
     short = ShortOptions(**{one.name: getattr(options, one.name) for one in fields(ShortOptions)})

@@ -9,9 +9,9 @@ They hold the state of a run in numbers that do not depend on the ranks that go 
 - ``r_n``, ``active`` and with friction ``r_t``, a row for each condition of all ranks, in the order
   of ``surface.slots``;
 - other arrays of the memory, which are the same on every rank;
-- ``about``, a text in JSON: t, k, the base steps done, what problem it is of (``identity``), the
+- ``about``, a text in JSON: t, k, the base steps done, what problem it is of (``identify``), the
   checksum of the histories, and the number of the format;
-- ``checksum``, of all the others.
+- ``compute_checksum``, of all the others.
 
 It is of the end of a base step, never inside a halved one, so that a restart takes the steps of the
 straight run, and always replaced as a whole. Only rank 0 touches the file (``on_root``).
@@ -44,7 +44,7 @@ from ...core.problem import ContactProblem
 from ...core.step import Scheme, State
 from ..time_steps import TimeSteps
 from .folder import CHECKPOINT, FORMAT, check_format
-from .identity import FIXED, differences, identity
+from .identity import FIXED, find_differences, identify
 
 log = logging.getLogger(__name__)
 Arrays = dict[str, Any]
@@ -109,7 +109,7 @@ def write_checkpoint(
         folder: of the run.
         problem: what is marched.
         place: where it is left.
-        run_of: the "run", as ``identity`` sees it over a "span" of times [s].
+        run_of: the "run", as ``identify`` sees it over a "span" of times [s].
         rows: checksum of the histories up to here.
         safe: whether these are on the medium, and the checkpoint shall be.
 
@@ -147,13 +147,13 @@ def write_checkpoint(
             arrays[name] = np.concatenate([own[name] for _, own in parts])[order]
         arrays["about"] = np.array(about)
         buffer = io.BytesIO()
-        np.savez(buffer, checksum=np.array(checksum(arrays)), **arrays)
+        np.savez(buffer, checksum=np.array(compute_checksum(arrays)), **arrays)
         write_atomically(folder / CHECKPOINT, buffer.getvalue(), safe=safe)
 
     on_root(problem.system.algebra.comm, write)
 
 
-def checksum(arrays: Mapping[str, Any]) -> str:
+def compute_checksum(arrays: Mapping[str, Any]) -> str:
     """Return the checksum of names, types, shapes and values."""
     digest = hashlib.sha256()
     for name, values in sorted(arrays.items()):
@@ -163,9 +163,9 @@ def checksum(arrays: Mapping[str, Any]) -> str:
     return digest.hexdigest()
 
 
-def state_checksum(folder: Path) -> str:
+def read_state_checksum(folder: Path) -> str:
     """Return the checksum of the state that the checkpoint in a folder holds."""
-    return checksum(_unpack(folder / CHECKPOINT)[1])
+    return compute_checksum(_unpack(folder / CHECKPOINT)[1])
 
 
 def _split(problem: ContactProblem, state: State) -> tuple[Arrays, Arrays]:
@@ -283,7 +283,7 @@ def _compare(
         InputError: there are differences that are not allowed, or that cannot be.
     """
     start, end = about["span"]
-    changes = differences(identity(problem, scheme, dt, start=start, end=end), about["run"])
+    changes = find_differences(identify(problem, scheme, dt, start=start, end=end), about["run"])
     for name, how in changes.items():
         if name in FIXED or not changed:
             remedy = "or start a new one"
@@ -299,7 +299,7 @@ def _compare(
     return list(changes)
 
 
-def _error_of_damage(file: Path, why: Any) -> InputError:
+def _describe_damage(file: Path, why: Any) -> InputError:
     """Return the error about a checkpoint that cannot be read, with a reason on one line."""
     reason = " ".join(str(why).split())[:LONGEST]  # zipfile puts half the file into its words
     return InputError(f"the checkpoint '{file}' is damaged ({reason}): start a new run")
@@ -316,14 +316,14 @@ def _read(file: Path, problem: ContactProblem) -> tuple[dict[str, Any], Arrays]:
     except DAMAGE as error:
         if of_machine(error):
             raise
-        raise _error_of_damage(file, str(error) or type(error).__name__) from error
+        raise _describe_damage(file, str(error) or type(error).__name__) from error
     check_format(file, about.get("format"))
     try:
         _check_sizes(problem, about, arrays)
     except KeyError as error:
-        raise _error_of_damage(file, f"{error} is missing") from error
+        raise _describe_damage(file, f"{error} is missing") from error
     except (InputError, TypeError) as error:
-        raise _error_of_damage(file, error) from error
+        raise _describe_damage(file, error) from error
     return about, arrays
 
 
@@ -344,7 +344,7 @@ def _unpack(file: Path) -> tuple[dict[str, Any], Arrays]:
     about = json.loads(str(arrays["about"]))
     if not isinstance(about, dict) or not isinstance(about.get("run"), dict):
         raise ValueError("the description of the run is missing")
-    if str(announced) != checksum(arrays):
+    if str(announced) != compute_checksum(arrays):
         raise ValueError("its checksum is wrong")
     del arrays["about"]
     return about, arrays

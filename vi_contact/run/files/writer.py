@@ -21,7 +21,7 @@ from .checkpoint import RestartPoint, write_checkpoint
 from .folder import CHECKPOINT, LOG, SUMMARY, clear, remove_litter, take
 from .history import GEOMETRY, HistoryFiles
 from .log import RunLog
-from .stored_rows import StoredRows, times_of
+from .stored_rows import StoredRows, read_times
 from .table import Table
 
 log = logging.getLogger(__name__)
@@ -120,7 +120,7 @@ class Writer:
         if self._settings is not None:
             kept: Mapping[int, float] = {}
             if self._continued:
-                kept = on_root(self._comm, lambda: times_of(folder, frames_of(folder))) or {}
+                kept = on_root(self._comm, lambda: read_times(folder, frames_of(folder))) or {}
             self._fields = self._settings.open(self._problem, folder, kept)
             if not self._continued:
                 self._fields.write(state, np.zeros_like(state.u))

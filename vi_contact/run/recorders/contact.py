@@ -11,7 +11,7 @@ from ...core.arguments import check_fields
 from ...core.problem import ContactProblem
 from ...core.step import AXES, Columns, Report, Row, State
 from ...core.surfaces import ContactSurface
-from .columns import along_axes
+from .columns import expand_axes
 
 # Column -> (unit, meaning). One with {axis} in its name is recorded once for each axis.
 _CONTACT_COLUMNS: Columns = {
@@ -92,9 +92,9 @@ class Contact:
 
         Call ``start`` first.
         """
-        columns = along_axes(_CONTACT_COLUMNS, self._axes)
+        columns = expand_axes(_CONTACT_COLUMNS, self._axes)
         if self._frictional:
-            columns = {**columns, **along_axes(_FRICTION_COLUMNS, self._axes)}
+            columns = {**columns, **expand_axes(_FRICTION_COLUMNS, self._axes)}
         if self.arrays:
             return columns
         return {name: about for name, about in columns.items() if name not in self._ARRAYS}

@@ -47,7 +47,7 @@ from ....run.method import with_defaults
 from ....run.recorders import Contact, Energy
 from ....run.recorders.steps import Steps
 from ....run.simulate import Solution, simulate
-from ....run.time_steps import StepPlan, step_plan
+from ....run.time_steps import StepPlan, plan_steps
 from ...engineering.checks.comparison import Check
 from .bodies import BeamBody, Body, LayerLaw, ParticleBody, own_body, refuse_mixed, refuse_ranks
 from .expressions import check_axes
@@ -144,7 +144,7 @@ class Case:
             # else as long as the excitation
             steps = own.get("steps") if "steps" in own or "t_end" in own else 1
             try:
-                step_plan(own["dt"], steps, own.get("t_end"))
+                plan_steps(own["dt"], steps, own.get("t_end"))
             except InputError as error:
                 raise InputError(f"{self.path}: [run] {error}") from None
         if self.body is not None:
@@ -160,7 +160,7 @@ class Case:
     def plan(self, parts: Parts) -> StepPlan:
         """Return the base steps of the run."""
         own = self._timed(parts)
-        return step_plan(own["dt"], own.get("steps"), own.get("t_end"))
+        return plan_steps(own["dt"], own.get("steps"), own.get("t_end"))
 
     def _timed(self, parts: Parts) -> dict[str, Any]:
         """Return what [run] gives.

@@ -19,7 +19,7 @@ from ....core.step import AXES
 from ....fem.body.space import space_of
 from ....fem.mesh.tagged_mesh import Cells, Facets
 from ....fem.output.outline import cell_volumes, facets_with_cells, longest_edge, outline
-from ....run.damping import NOT_COMPUTED, damping_in_words, first_modes, first_open_period
+from ....run.damping import NOT_COMPUTED, describe_damping, first_modes, first_open_period
 from ....run.files.folder import MODEL
 from ....run.loose_bodies import judge_loose_bodies
 from ....run.sampling import sampling_warning
@@ -438,7 +438,7 @@ def _modes(case: Any, problem: ContactProblem, most: int) -> dict[str, Any]:
     if problem.system.C is None and "periods" not in found and few:
         return {**found, "damping_ratios": [], "damping": "none"}
     unknown = "" if few else f"{NOT_COMPUTED}, as the model has more than {most} unknowns"
-    return {**found, "damping": damping_in_words(problem, unknown=unknown)}
+    return {**found, "damping": describe_damping(problem, unknown=unknown)}
 
 
 def _defects(model: Mapping[str, Any]) -> Iterator[str]:

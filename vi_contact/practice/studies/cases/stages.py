@@ -26,7 +26,7 @@ from ....core.state_checks import initial_state
 from ....core.step import State
 from ....fem.body.released_supports import release, removed_support, same_supports, started
 from ....fem.mesh.communicators import MpiComm
-from ....run.files.checkpoint import state_checksum
+from ....run.files.checkpoint import read_state_checksum
 from ....run.files.folder import (
     CHECKPOINT,
     FOLLOWS,
@@ -108,7 +108,9 @@ def run_stages(
             )
             place = out or (source if found else None)
             left = (
-                None if place is None else on_root(ranks, partial(state_checksum, place / folder))
+                None
+                if place is None
+                else on_root(ranks, partial(read_state_checksum, place / folder))
             )
             before += f"{left} {solution.state.k}\n"
     return solution
