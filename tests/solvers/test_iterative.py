@@ -21,7 +21,7 @@ from vi_contact.core.verify import kkt_residual
 from vi_contact.solvers import Iterative
 from vi_contact.solvers.iterative.conjugate_gradients import format_residuals
 from vi_contact.solvers.iterative.layout import Nodewise
-from vi_contact.solvers.iterative.preconditioners import KINDS, choose, compute_courant
+from vi_contact.solvers.iterative.preconditioners import KINDS, choose_kind, compute_courant
 
 M = 8  # contact points of pushed_block
 HALF = np.array([0.3, 0.0] * 4)
@@ -353,7 +353,7 @@ def test_the_courant_number_follows_the_matrices() -> None:
     assert compute_courant(effective(K, range(4), (0.0, M))) == np.inf
     assert np.isnan(compute_courant(effective(K, range(4))))
     numbers = (0.1, 0.5, 0.6, 30.0, 31.0, np.inf, np.nan)
-    assert [choose(one, modes=True) for one in numbers] == [
+    assert [choose_kind(one, modes=True) for one in numbers] == [
         "jacobi",
         "jacobi",
         "icc",
@@ -362,4 +362,4 @@ def test_the_courant_number_follows_the_matrices() -> None:
         "gamg",
         "icc",
     ]
-    assert choose(np.inf, modes=False) == "icc"
+    assert choose_kind(np.inf, modes=False) == "icc"

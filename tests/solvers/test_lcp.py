@@ -8,7 +8,7 @@ from reference_lcp import LCP, spd
 from scipy.sparse import csr_matrix
 
 from vi_contact.core.errors import InputError
-from vi_contact.solvers.normal.lcp import energy_scale, scale_dense
+from vi_contact.solvers.normal.lcp import compute_scale, scale_dense
 
 pytestmark = pytest.mark.serial
 
@@ -82,7 +82,7 @@ def test_dense_scaling_has_unit_diagonal_and_refuses_unsymmetric_matrices():
     G = np.array([[4.0, 1.0], [1.0, 9.0]])
     scaled = scale_dense(G, UNILATERAL)
     assert scaled.matrix == pytest.approx(np.array([[1.0, 1.0 / 6.0], [1.0 / 6.0, 1.0]]), rel=1e-15)
-    assert energy_scale(G) == pytest.approx(np.array([0.5, 1.0 / 3.0]), rel=1e-15)
+    assert compute_scale(G) == pytest.approx(np.array([0.5, 1.0 / 3.0]), rel=1e-15)
     with pytest.raises(InputError, match="not symmetric"):
         scale_dense(np.array([[4.0, 1.0], [1.1, 9.0]]), UNILATERAL)
     with pytest.raises(InputError, match="NaN"):

@@ -282,7 +282,7 @@ class Proximal:
         bending = 2.0 * system.strain_energy(motion.d)
         work = system.algebra.dot(self.step.b, motion.d)
         stopped = self.step.surface.some(self._find_closing(motion))
-        # Any of these: it does not move, it deforms the body, no load drives it, a contact stops it.
+        # It does not move, it deforms the body, no load drives it, or a contact stops it.
         if energy == 0.0 or bending > RIGID * energy or work < DRIVEN * energy or stopped:
             return
         way = self._describe_way(motion.d)

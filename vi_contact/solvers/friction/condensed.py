@@ -121,7 +121,7 @@ class CondensedFriction:
             return self._small.solve(q, cohesion, mu, guess)
 
         def slip_of(answer: FrictionResult) -> Array:
-            return self._slip(q, answer)[surface.slots]
+            return self._compute_slip(q, answer)[surface.slots]
 
         answer = self._rates.solve(step, rest, slope, solve, slip_of)
 
@@ -166,7 +166,7 @@ class CondensedFriction:
         rows = StepResult(x, r[..., 0].copy(), active, 0, self._name, r_t=r[..., 1:].copy())
         return Answers(rows, counts, failed, histories)
 
-    def _slip(self, q: Array, answer: FrictionResult) -> Array:
+    def _compute_slip(self, q: Array, answer: FrictionResult) -> Array:
         """Return B_t x - slip0 (m, d - 1) of points under pressure, zero where they stick."""
         moved = (self.delassus @ answer.r.ravel()).reshape(q.shape)
         w_t = q[:, 1:] + moved[:, 1:]

@@ -74,10 +74,10 @@ class GivenForces(Settings):
         apart[:, ::d] = 0.0
         np.fill_diagonal(apart[::d, ::d], 1.0)
         tangential = self.tangential.prepare(apart, np.zeros_like(bilateral))
-        loop = partial(self._loop, normal, tangential)
+        loop = partial(self._iterate, normal, tangential)
         return PreparedFriction(self, LOOSE * self.tolerance, delassus, loop)
 
-    def _loop(self, normal: Any, tangential: Any, step: ScaledProblem, r: Array) -> LastIterate:
+    def _iterate(self, normal: Any, tangential: Any, step: ScaledProblem, r: Array) -> LastIterate:
         """Alternate the two problems from r (m, d), which is overwritten.
 
         Args:

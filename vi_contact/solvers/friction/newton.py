@@ -75,10 +75,10 @@ class FrictionNewton(Settings):
         # Compiled sweeps read half of G.
         loops = load_loops(SerialComm()) if delassus.symmetric else None
         short = delassus.make_short() if loops and delassus.count else None
-        loop = partial(self._loop, loops, short, {})
+        loop = partial(self._iterate, loops, short, {})
         return PreparedFriction(self, self.tolerance, delassus, loop)
 
-    def _loop(
+    def _iterate(
         self,
         loops: Any,
         short: ShortMatrices | None,
@@ -107,7 +107,7 @@ class FrictionNewton(Settings):
         sweeps = 0
         for attempt in range(ATTEMPTS):
             y = r - (step.w(r) if w is None else w)
-            r, is_solved = self._newton(factors, step, y, history)
+            r, is_solved = self._run_newton(factors, step, y, history)
             if is_solved or attempt == ATTEMPTS - 1:
                 break
             sweep = make_sweep(step)
@@ -122,7 +122,7 @@ class FrictionNewton(Settings):
                     break
         return LastIterate(r, len(history) + sweeps, history)
 
-    def _newton(
+    def _run_newton(
         self, factors: Factors, step: ScaledProblem, y: Array, history: list[float]
     ) -> tuple[Array, bool]:
         """Iterate by Newton's method until it solves the problem or comes back to old states.

@@ -38,9 +38,9 @@ class NSGS(Settings):
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedFriction:
         """Check and scale G (m d, m d); ``bilateral`` (m,) says which rows are bilateral."""
-        return PreparedFriction(self, self.tolerance, ScaledDelassus(G, bilateral), self._loop)
+        return PreparedFriction(self, self.tolerance, ScaledDelassus(G, bilateral), self._iterate)
 
-    def _loop(self, step: ScaledProblem, r: Array) -> LastIterate:
+    def _iterate(self, step: ScaledProblem, r: Array) -> LastIterate:
         """Sweep from r until the residual is small, or rounding."""
         sweep = make_sweep(step)
         history: list[float] = []

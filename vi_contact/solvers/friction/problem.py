@@ -36,7 +36,7 @@ from ...core.checks import provides
 from ...core.errors import InputError, StepFailure
 from ...core.quantities import Positive
 from ...laws.friction import project
-from ..normal.lcp import EPS, check_gap, energy_scale, scale_matrix
+from ..normal.lcp import EPS, check_gap, compute_scale, scale_matrix
 
 FEW = 0.25  # share of the unknowns that carry something, up to which a product by rows is faster
 STILL = 4.0  # how many times the residual, or its rounding, the slip of points that stick may be
@@ -274,7 +274,7 @@ class ScaledDelassus:
                 f"the Delassus operator has shape {G.shape} for {m} points: give m d rows, node by "
                 "node"
             )
-        scale = energy_scale(G).reshape(m, d)
+        scale = compute_scale(G).reshape(m, d)
         if d > 1:  # one number for the tangents of a node: disks stay disks
             mean = np.mean(scale[:, 1:] ** -2.0, axis=1)
             scale[:, 1:] = mean[:, None] ** -0.5

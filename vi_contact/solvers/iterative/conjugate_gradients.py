@@ -110,7 +110,9 @@ class ConjugateGradients:
         )
 
 
-def cg_failure(name: str, reason: int, iterations: int, history: Sequence[float]) -> StepFailure:
+def make_cg_failure(
+    name: str, reason: int, iterations: int, history: Sequence[float]
+) -> StepFailure:
     """Return the error of a solver that stopped without an answer.
 
     Args:

@@ -156,7 +156,7 @@ class FrictionNewtonStep:
         solver = self.solver
         tangents = solver.tangents
         closed = solver.contact.closed
-        slip = self._slip_at_x()
+        slip = self._compute_slip()
 
         # No reactions are known: y = c slip alone, which would let all points slip.
         if solver.last is None:
@@ -171,9 +171,9 @@ class FrictionNewtonStep:
         r_n = np.where(closed, last.r_n, 0.0)
         y_t = last.r_t + tangents.c[:, None] * slip
         stuck = closed & ~np.any(last.slip, axis=1) & (last.r_n > 0.0)
-        return States(tangents, self._limits(slip, r_n, y_t), (r_n, y_t), slip, stuck=stuck)
+        return States(tangents, self._find_limits(slip, r_n, y_t), (r_n, y_t), slip, stuck=stuck)
 
-    def _slip_at_x(self) -> Array:
+    def _compute_slip(self) -> Array:
         """Return B_t x - slip0 (m, d - 1), zero where a tangent is prescribed."""
         solver = self.solver
         moved = solver.tangents.values(self.x) - self.slip0
@@ -219,14 +219,14 @@ class FrictionNewtonStep:
         self.scales = self.measured(solver.contact, self.x, self.residual, self.load)
         self.r_n = solver.contact.reactions(self.x, self.residual)
         self.r_t = solver.tangents.values(self.residual)
-        self.slip = self._slip_at_x()
-        self.limits = self._limits(self.slip, self.r_n, self.r_t)
+        self.slip = self._compute_slip()
+        self.limits = self._find_limits(self.slip, self.r_n, self.r_t)
 
-    def _limits(self, slip: Array, r_n: Array, y_t: Array) -> Limits:
+    def _find_limits(self, slip: Array, r_n: Array, y_t: Array) -> Limits:
         """Return the friction limits at a slip, for points that y_t would move from rest."""
         return self.law(slip, r_n, np.linalg.norm(y_t, axis=1) / self.solver.tangents.c)
 
-    def _friction_on_cone(self) -> Array:
+    def _put_on_cone(self) -> Array:
         """Return the friction (m, d - 1) that the law allows next to r_t.
 
         It is along the slip where that is certain, and the projection of y_t elsewhere.
@@ -258,8 +258,8 @@ class FrictionNewtonStep:
 
         # The residual of free rows; in the rows of tangents, what r_t misses of the law.
         error = np.where(solver.contact.weights() > 0.0, self.residual, 0.0)
-        error[tangents.rows] = tangents.flatten(self.r_t - self._friction_on_cone())
-        wrong = self._wrong_signs(0.0)
+        error[tangents.rows] = tangents.flatten(self.r_t - self._put_on_cone())
+        wrong = self._find_wrong_signs(0.0)
         local = np.array(
             [max_abs(error), np.any(wrong), max_abs(self.limits(self.r_n))], dtype=float
         )
@@ -270,7 +270,7 @@ class FrictionNewtonStep:
         force = self.scales.force
         self.history.append(self.error / force if 0.0 < force < np.inf else self.error)
         if not np.isfinite(self.error):
-            raise self._failure(*REASONS[NOT_A_NUMBER])
+            raise self._make_failure(*REASONS[NOT_A_NUMBER])
         self.goal = solver.worth.goal(
             self.error, self.scales, self.x, self.r_n, self.r_t, begin=self.steps == 0
         )
@@ -282,12 +282,12 @@ class FrictionNewtonStep:
         is_round_done = not any_wrong and self.error <= max(ROUND * limit, self.goal)
         if not self.law.settled and is_round_done:
             self.law.advance(self.slip, self.r_n)
-            self.limits = self._limits(self.slip, self.r_n, self.r_t)
+            self.limits = self._find_limits(self.slip, self.r_n, self.r_t)
             return self.judge()
 
         # x does not solve the step: refuse, or see to it that Newton does not go in circles.
         if self.steps == STEPS:
-            raise self._failure(
+            raise self._make_failure(
                 "the states of friction did not settle", "take a smaller step of time or load"
             )
         if self.law.settled:
@@ -304,7 +304,7 @@ class FrictionNewtonStep:
         self._newton_steps = 0
         self._rounds = min(2 * self._rounds, MOST_GIVEN)
 
-    def _wrong_signs(self, error: float) -> Mask:
+    def _find_wrong_signs(self, error: float) -> Mask:
         """Return the conditions (m,) whose signs are wrong by more than the error of the residual.
 
         The error is in the unit of forces.
@@ -336,15 +336,15 @@ class FrictionNewtonStep:
             share = min(SHARE, AHEAD * self.history[-1] / self.history[-2])
         dx, left, reason = solver.gmres.solve(residual, share, 0.5 * self.goal)
         if reason < 0:
-            raise self._failure(*REASONS.get(reason, GMRES_BROKE_DOWN))
+            raise self._make_failure(*REASONS.get(reason, GMRES_BROKE_DOWN))
 
         solver.operator.work.newton_steps += 1
         self.steps += 1
         self.x += dx
         self._update_residual()
-        self._apply_states(*self._states_at_x(left))
+        self._apply_states(*self._update_states(left))
 
-    def _states_at_x(self, error: float) -> tuple[States, Mask]:
+    def _update_states(self, error: float) -> tuple[States, Mask]:
         """Return the states at x, and the conditions (m,) that close or open with them.
 
         The error is what the linear problem left of its residual.
@@ -352,7 +352,7 @@ class FrictionNewtonStep:
         solver = self.solver
         contact = solver.contact
         tangents = solver.tangents
-        wrong = self._wrong_signs(0.0 if error <= self.goal else error)
+        wrong = self._find_wrong_signs(0.0 if error <= self.goal else error)
 
         # y_n is r_n; of a condition that closes it is what presses it back onto its bound.
         stiffness = np.where(contact.soft, contact.k, contact.diagonal)
@@ -361,7 +361,7 @@ class FrictionNewtonStep:
         contact.change(wrong)
 
         y_t = self.r_t + tangents.c[:, None] * self.slip
-        limits = self._limits(self.slip, y_n, y_t)
+        limits = self._find_limits(self.slip, y_n, y_t)
         return States(tangents, limits, (y_n, y_t), self.slip, before=self.states), wrong
 
     def answer(self) -> tuple[StepResult, LastContact]:
@@ -373,7 +373,7 @@ class FrictionNewtonStep:
         # Reactions on their cone: no tension but of bilateral conditions, r_t as the law allows.
         pulls = ~contact.bilateral & (self.r_n < 0.0)
         self.r_n = np.where(pulls, 0.0, self.r_n)
-        r_t = self._friction_on_cone()
+        r_t = self._put_on_cone()
 
         # Tangents that stick go exactly where the slip is zero.
         y_t = self.r_t + tangents.c[:, None] * self.slip
@@ -396,7 +396,7 @@ class FrictionNewtonStep:
         )
         return result, LastContact(self.r_n, r_t, slip)
 
-    def _failure(self, words: str, remedy: str) -> StepFailure:
+    def _make_failure(self, words: str, remedy: str) -> StepFailure:
         """Return the error of a step without an answer, with the history of residuals."""
         return StepFailure(
             f"{self.solver.name} stopped after {self.steps} Newton steps, {words} (residuals "

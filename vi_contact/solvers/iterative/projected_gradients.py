@@ -202,7 +202,7 @@ class Face:
 
         # The length of the conjugate gradient step r - length p, and the largest one that stays
         # within the bounds, of all ranks.
-        image, curvature = self._curvature(p)
+        image, curvature = self._measure_curvature(p)
         length = problem.dot(self.gradient, p) / curvature
         blocking = p > 0.0
         steps = (self.r - lower)[blocking] / p[blocking]
@@ -223,12 +223,12 @@ class Face:
 
     def _release(self) -> None:
         """Proportioning: go down along -beta, which takes entries off their bound."""
-        image, curvature = self._curvature(self.beta)
+        image, curvature = self._measure_curvature(self.beta)
         length = self._problem.dot(self.gradient, self.beta) / curvature
         self._place(self.r - length * self.beta, self.gradient - length * image)
         self._restart()
 
-    def _curvature(self, p: Array) -> tuple[Array, float]:
+    def _measure_curvature(self, p: Array) -> tuple[Array, float]:
         """Return G p and pᵀG p."""
         image = self._problem.apply(p)
         curvature = self._problem.dot(p, image)

@@ -26,9 +26,9 @@ from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
 from ..certified import check_laws
 from ..petsc import PETSc
-from ..volume.failures import petsc_failure
+from ..volume.failures import make_petsc_failure
 from ..volume.options import OptionLayers
-from .conjugate_gradients import SOLVED, WRONG_SIGNS, ConjugateGradients, cg_failure
+from .conjugate_gradients import SOLVED, WRONG_SIGNS, ConjugateGradients, make_cg_failure
 from .contact import Contact
 from .friction import FrictionSolver
 from .layout import Nodewise
@@ -42,7 +42,7 @@ from .preconditioners import (
     Inverse,
     Masked,
     Multigrid,
-    choose,
+    choose_kind,
     compute_courant,
     defaults,
 )
@@ -161,7 +161,7 @@ class PreparedIterative:
         """Return the preconditioner, and write it into the log. Collective."""
         number = compute_courant(A)
         asked = self._settings.preconditioner
-        kind = choose(number, A.space is not None) if asked == AUTO else asked
+        kind = choose_kind(number, A.space is not None) if asked == AUTO else asked
         if A.algebra.comm.rank == 0:
             overlaps = kind == ICC and A.algebra.comm.size > 1
             log.info(
@@ -217,7 +217,7 @@ class PreparedIterative:
             if error.__cause__ is not None:
                 # raised in one of our callbacks; PETSc before 3.22 passes it on
                 raise error.__cause__ from None
-            raise petsc_failure(self._name, error) from error
+            raise make_petsc_failure(self._name, error) from error
 
     @cached_property
     def _friction(self) -> FrictionSolver:
@@ -267,7 +267,7 @@ class PreparedIterative:
             x, residual, reason = descend(search, self._diagonal, self._norm, x)
         if reason != SOLVED:
             iterations = self.work.linear_iterations - before
-            raise cg_failure(self._name, reason, iterations, search.history)
+            raise make_cg_failure(self._name, reason, iterations, search.history)
         self._worth.keep()
         return StepResult(
             x=layout.strip(x),

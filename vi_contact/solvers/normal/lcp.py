@@ -191,7 +191,7 @@ def scale_dense(G: Array, bilateral: Mask, *, unsymmetric: bool = False) -> Scal
     if not isinstance(G, np.ndarray):
         raise InputError("this method needs the Delassus operator as an array: form it")
     check_operator(G, bilateral)
-    d = energy_scale(G, signed=unsymmetric)
+    d = compute_scale(G, signed=unsymmetric)
     return ScaledLCP(d, *scale_matrix(G, d, unsymmetric=unsymmetric), bilateral.copy())
 
 
@@ -217,7 +217,7 @@ def scale_matrix(G: Array, d: Array, *, unsymmetric: bool = False) -> tuple[Arra
     return matrix, float(np.abs(matrix).sum(axis=1).max(initial=0.0))
 
 
-def energy_scale(G: Array, *, signed: bool = False) -> Array:
+def compute_scale(G: Array, *, signed: bool = False) -> Array:
     """Return d = |G_ii|^(-1/2) (m,).
 
     Args:
@@ -243,7 +243,7 @@ def energy_scale(G: Array, *, signed: bool = False) -> Array:
     return diagonal**-0.5
 
 
-def cholesky(G: Array) -> Array:
+def factorise(G: Array) -> Array:
     """Return the lower Cholesky factor (LAPACK dpotrf).
 
     Raises:
@@ -284,7 +284,7 @@ def check_gap(q: Array, bilateral: Mask) -> None:
         )
 
 
-def failure(method: object, *, iterations: int, residual: float, advice: str) -> StepFailure:
+def make_failure(method: object, *, iterations: int, residual: float, advice: str) -> StepFailure:
     """Return the error of a method that did not reach its tolerance.
 
     Args:

@@ -28,7 +28,7 @@ class FrictionJacobian:
         self._system: FrictionSystem = scaled.friction
         self._scaled = weakref.proxy(scaled)  # PETSc holds the matrix: see weakly()
         self._ratio = np.nan
-        total, parts = self._entries()
+        total, parts = self._list_entries()
 
         # The entries of all parts, none of which is given twice, are sorted once by rows and
         # columns: a matrix of their numbers tells the order.
@@ -45,7 +45,7 @@ class FrictionJacobian:
         self.mat = make_aij(places, self._system.body.comm)
         self._csr = places.indptr.astype(PETSc.IntType), places.indices.astype(PETSc.IntType)
 
-    def _entries(self) -> tuple[int, dict[str, Entries]]:
+    def _list_entries(self) -> tuple[int, dict[str, Entries]]:
         """Return how many columns there are on all ranks, and the parts of the matrix. Collective.
 
         What changes from step to step, or with y, is zero.
@@ -54,7 +54,7 @@ class FrictionJacobian:
         body = system.body
         line = system.line
         pairs = system.pairs
-        indptr, columns, A = _rows_of(body)
+        indptr, columns, A = _copy_rows(body)
         first, columns, total = renumber(system.surface.comm, body.size, system.size, columns)
         lam = body.size + np.arange(len(system.tangent))
         gamma = system.first_gamma + np.arange(len(pairs))
@@ -131,7 +131,7 @@ class FrictionJacobian:
         self.mat.destroy()
 
 
-def _rows_of(body: Any) -> Any:
+def _copy_rows(body: Any) -> Any:
     """Return CSR arrays of the owned rows of the body with its springs, in copies."""
     assembled = body.assemble()
     arrays = [np.array(part) for part in assembled.getValuesCSR()]

@@ -26,10 +26,10 @@ from ...core.surfaces import ContactSurface
 from ..certified import check_laws
 from ..petsc import PETSc
 from .bounded_system import BoundedSystem
-from .failures import petsc_failure
+from .failures import make_petsc_failure
 from .friction import VolumeFriction
 from .friction_system import FrictionSystem, ScaledFrictionStep
-from .options import OptionLayers, Options, direct
+from .options import OptionLayers, Options, choose_direct
 from .scaled_step import ScaledStep
 from .snes import ReducedNewton, SemismoothNewton, SnesDriver
 from .tao import TaoDriver, TaoTron
@@ -146,7 +146,7 @@ class PreparedVolume:
         ranks = surface.comm.size
         defaults = settings.method.defaults(ranks)
         if not self._system.symmetric:
-            defaults = {**defaults, **direct("lu", ranks)}
+            defaults = {**defaults, **choose_direct("lu", ranks)}
         self._layers = self._make_layers(defaults)
 
         # One driver at a time: of steps without friction at first, or of those with friction, which
@@ -214,7 +214,7 @@ class PreparedVolume:
             if error.__cause__ is not None:
                 # raised in one of our callbacks; PETSc before 3.22 passes it on
                 raise error.__cause__ from None
-            raise petsc_failure(self._name, error) from error
+            raise make_petsc_failure(self._name, error) from error
         except StepFailure:
             self.close()
             raise

@@ -25,7 +25,7 @@ from .options import (
     check_friction,
     check_reduced,
     check_semismooth,
-    direct,
+    choose_direct,
 )
 from .scaled_step import ScaledStep
 
@@ -239,7 +239,7 @@ class ReducedNewton:
 
     def defaults(self, ranks: int) -> Options:
         """Return the options that come before the user's."""
-        return {**NEWTON, **direct("cholesky", ranks)}
+        return {**NEWTON, **choose_direct("cholesky", ranks)}
 
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> SnesDriver:
         """Return the SNES object."""
@@ -253,7 +253,7 @@ class ReducedNewton:
         pivots, for which MUMPS on several ranks needs more room than usual, or stops with
         INFOG(1) = -9.
         """
-        return {**NEWTON, **direct("lu", ranks, exchanges=True), "mat_mumps_icntl_14": 200}
+        return {**NEWTON, **choose_direct("lu", ranks, exchanges=True), "mat_mumps_icntl_14": 200}
 
     def friction_driver(self, scaled: ScaledFrictionStep, layers: OptionLayers) -> SnesDriver:
         """Return the SNES object of a step with friction."""
@@ -273,7 +273,7 @@ class SemismoothNewton:
 
     def defaults(self, ranks: int) -> Options:
         """Return the options that come before the user's."""
-        return {**NEWTON, "snes_linesearch_type": "bt", **direct("lu", ranks)}
+        return {**NEWTON, "snes_linesearch_type": "bt", **choose_direct("lu", ranks)}
 
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> SnesDriver:
         """Return the SNES object."""
