@@ -27,21 +27,21 @@ def measure_memory(problem: ContactProblem, A: EffectiveMatrix | None) -> dict[s
         "factor": [A.factor if A is not None and A.factorised else None],
         "mesh": [problem.system.space],
     }
-    known: dict[str, int] = {}
+    sizes: dict[str, int] = {}
     for name, things in owners.items():
         distinct = {id(thing): thing for thing in things}  # bases may share a matrix
         size = total(comm, sum(getattr(thing, "bytes", 0) for thing in distinct.values()))
         if size:
-            known[name] = round(size)
+            sizes[name] = round(size)
     peak = 1024 * getrusage(RUSAGE_SELF).ru_maxrss
-    return {"peak_bytes": from_each(comm, peak), "bytes": known}
+    return {"peak_bytes": from_each(comm, peak), "bytes": sizes}
 
 
 def describe_memory(memory: Mapping[str, Any]) -> str:
-    """Return the same in a line, in megabytes."""
+    """Return what ``measure_memory`` has returned in a line, in megabytes."""
     peaks = memory["peak_bytes"]
-    known = "".join(f"; {name} {1e-6 * size:.3g}" for name, size in memory["bytes"].items())
+    sizes = "".join(f"; {name} {1e-6 * size:.3g}" for name, size in memory["bytes"].items())
     return (
         f"memory [MB]: at most {1e-6 * max(peaks):.4g} on a rank, {1e-6 * sum(peaks):.4g} on "
-        f"all{known}"
+        f"all{sizes}"
     )

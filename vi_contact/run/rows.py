@@ -1,10 +1,10 @@
-"""Hold what several runs have in one step as rows.
+"""Hold what several runs have in one step as rows: arrays (k, n) and (k, m) of k runs.
 
-That of one run is made when somebody asks for it.
-
-A step of a small system costs as much as the objects that tell of it: those that nobody reads are
-not made. What was made stays as it is, whatever the runs do later: every step has arrays of its
-own, and nobody writes to them.
+The numerics of ``together`` works on these rows. The objects of one run (its state, its step, its
+report) are made when somebody asks for them, as views of the rows: a step of a small system costs
+as much as the objects that tell of it, and those that nobody reads are not made. What was made
+stays as it is, whatever the runs do later: every step has arrays of its own, and nobody writes to
+them.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -20,8 +20,8 @@ from ..core.step import Report, State, StepProblem
 from ..core.system import Load, history_value
 
 
-class Each(dict[int, Any]):
-    """Hold something of every run by its row, made when somebody asks for it."""
+class LazyRows(dict[int, Any]):
+    """Hold something of every run by its row, made when somebody asks for it, and then kept."""
 
     def __init__(self, make: Callable[[int], Any]) -> None:
         self._make = make
@@ -33,7 +33,11 @@ class Each(dict[int, Any]):
 
 
 class RowReport(Report):
-    """Report the step of one run; ``parts`` have those of every run, by the names of a report's."""
+    """Report the step of one run, whose parts are made when they are read.
+
+    It is made of ``row``, the row of the run, and of ``parts``: name of a part of a report -> what
+    has it by the row of every run.
+    """
 
     def __init__(self, **values: Any) -> None:
         self.__dict__.update(values)
@@ -78,7 +82,9 @@ def join_states(states: Sequence[State]) -> State:
     )
 
 
-def split_states(problem: ContactProblem, problems: Sequence[ContactProblem], many: State) -> Each:
+def split_states(
+    problem: ContactProblem, problems: Sequence[ContactProblem], many: State
+) -> LazyRows:
     """Return the states of the runs, each made when somebody asks for it.
 
     Their problems get to know the products of the rows with M, K and C.
@@ -102,7 +108,7 @@ def split_states(problem: ContactProblem, problems: Sequence[ContactProblem], ma
         r_t = None if many.r_t is None else many.r_t[row]
         return State(many.t, many.k, u, v, many.r_n[row], many.active[row], memory, r_t)
 
-    return Each(own_state)
+    return LazyRows(own_state)
 
 
 def split_step(problem: ContactProblem, many: StepProblem, row: int) -> StepProblem:

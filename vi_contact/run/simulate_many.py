@@ -45,8 +45,9 @@ def simulate_many(
         Interrupted, OutOfTime: as of ``simulate``, when all runs that have begun have written their
             checkpoints: ``restart=True`` continues them.
     """
-    given = several("simulate_many", "runs", runs, "give a list of arguments of simulate")
-    requests = [_make_request(run) for run in given]
+    # Check the arguments that runs must not share, before one is opened.
+    checked = several("simulate_many", "runs", runs, "give a list of arguments of simulate")
+    requests = [_make_request(run) for run in checked]
     recorders: list[int] = []
     folders: list[Path] = []
     for request in requests:
@@ -125,10 +126,16 @@ class _Turn:
 def _simulate_in_turn(
     requests: Sequence[RunRequest], tell: Callable[[float], None]
 ) -> Iterator[Ended]:
-    """Make a base step of every run in turn, until all have ended."""
+    """Make a base step of every run in turn, until all have ended.
+
+    Args:
+        requests: of the runs.
+        tell: gets the share of all steps that is done.
+    """
     going: list[_Turn] = []
-    stopped: Interrupted | None = None
+    stopped: Interrupted | None = None  # the first error that ends all runs
     with StopSignals(lasting=True) as signals, ExitStack() as stack:
+        # Open all runs; whatever ends this function closes each of them, with its checkpoint.
         for number, request in enumerate(requests):
             others = [turn.session.method.problem for turn in going]
             try:
@@ -139,11 +146,14 @@ def _simulate_in_turn(
                 yield number, error
                 continue
             place = session.place
-            loop = session.loop = Together(
+            loop = Together(
                 session.method, session.step_plan, place.state, place.base, place.halved
             )
+            session.loop = loop
             going.append(_Turn(number, session, loop, session.steps(writer, signals)))
             stack.callback(going[-1].close)
+
+        # Runs of one body get into groups, and base steps are made until no run is left.
         group_runs([turn.loop for turn in going])
         made = 0
         total = sum(turn.session.left for turn in going)
@@ -161,6 +171,9 @@ def _simulate_in_turn(
                     ends.append(turn.step())
             made += len(turns)
             tell(min(made / max(total, 1), 1.0))
+
+            # Who has ended leaves its group. A signal, or the end of the wall time, ends those too
+            # that have begun, each in its turn; the others never begin.
             for turn, end in zip(turns, ends, strict=True):
                 if end is None:  # what was done in the turn of one run was done for all
                     turn.session.seconds[-1] = (time.perf_counter() - begin) / len(turns)

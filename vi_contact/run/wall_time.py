@@ -110,6 +110,8 @@ class WallTime:
         """Say, at the end of a base step, whether another one might not end in time."""
         if self.text is None:
             return False
+        # What is still to come takes as long as the longest so far: another step and, for each run,
+        # a checkpoint and the histories. NaN, before the first checkpoint, is not over.
         now = measure_age()
         self._step = max(self._step, now - self._last)
         self._last = now

@@ -81,7 +81,8 @@ class RunLog:
 
     def check(self) -> None:
         """Raise the OSError of a line that could not be written."""
-        if error := self._file.error:
+        error = self._file.error
+        if error is not None:
             raise OSError(error.errno, error.strerror, str(self._file.path))
 
     def close(self) -> None:

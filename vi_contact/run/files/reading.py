@@ -184,14 +184,17 @@ def _fits(value: Any, kinds: type | tuple[type, ...]) -> bool:
 def _read_numbers(path: Path) -> dict[str, Array]:
     """Return the columns of history.csv; a last line that a crash cut short is left out."""
     try:
-        header, *lines = [
-            line for line in read_bytes(path).splitlines(keepends=True) if line.endswith(b"\n")
-        ]
+        whole_lines = []
+        for line in read_bytes(path).splitlines(keepends=True):
+            if line.endswith(b"\n"):
+                whole_lines.append(line)
+        header, *lines = whole_lines
         names = header.decode().strip().split(",")
         history = dict(zip(names, parse_numbers(str(path), lines, len(names), 0).T, strict=True))
         if not lines or len(history) != len(names):
             raise ValueError("there are no rows, or two columns have one name")
-        if missing := [name for name in _NEEDED if name not in history]:
+        missing = [name for name in _NEEDED if name not in history]
+        if missing:
             raise ValueError(f"no column {missing[0]}")
         if not np.all(np.isfinite(history["t"])) or np.any(np.diff(history["t"]) <= 0.0):
             raise ValueError("the times do not increase")
@@ -244,10 +247,10 @@ def _compare(path: Path, file: StoredFile, history: Mapping[str, Array]) -> None
     for name, numbers in history.items():
         if name not in file or file[name].ndim != 1:
             raise ValueError(f"{HISTORY_H5}: the column {shown(name)} is missing")
-        other = file[name][: len(numbers)]
-        own = numbers[: len(other)]
-        same = (other == own) | (np.isnan(other) & np.isnan(own))
-        differ = np.flatnonzero(~same)
+        in_hdf5 = file[name][: len(numbers)]
+        in_csv = numbers[: len(in_hdf5)]
+        are_equal = (in_hdf5 == in_csv) | (np.isnan(in_hdf5) & np.isnan(in_csv))
+        differ = np.flatnonzero(~are_equal)
         if len(differ):
             csv = path.with_name(HISTORY_CSV)
             raise InputError(

@@ -31,7 +31,7 @@ from .contact import Contact
 from .friction_krylov import Gmres, TurnedInverse
 from .friction_states import LawOfStep, Limits, States, Tangents
 from .layout import Layout
-from .measures import Measured, Worth
+from .measures import StepMeasure, Worth
 from .operator import Operator
 from .preconditioners import Inverse
 
@@ -138,7 +138,7 @@ class FrictionNewtonStep:
         assert step.slip0 is not None
         self.slip0 = step.slip0
         self.b = solver.layout.pad(step.b)
-        self.measured = Measured(step, self.b)
+        self.measure = StepMeasure(step, self.b)
         self.history: list[float] = []
         self.steps = 0
         self._newton_steps = 0  # with the step's own law, since something was given last
@@ -216,7 +216,7 @@ class FrictionNewtonStep:
         """Form the residual at x, and what follows from it."""
         solver = self.solver
         self.residual = self.load - (solver.operator @ self.x)
-        self.scales = self.measured(solver.contact, self.x, self.residual, self.load)
+        self.scales = self.measure(solver.contact, self.x, self.residual, self.load)
         self.r_n = solver.contact.reactions(self.x, self.residual)
         self.r_t = solver.tangents.values(self.residual)
         self.slip = self._compute_slip()

@@ -19,7 +19,7 @@ from ...core.algebra import Array, Comm, Mask, largest, total
 from ...core.step import StepProblem
 from .conjugate_gradients import NOT_A_NUMBER, SOLVED, STAGNATED, WRONG_SIGNS, ConjugateGradients
 from .contact import Contact
-from .measures import Measured, Worth, largest_free
+from .measures import StepMeasure, Worth, largest_free
 from .operator import Operator
 from .preconditioners import Inverse, Masked
 
@@ -71,7 +71,7 @@ class Search:
         self.b = b
         self.tolerance = tolerance
         self.patience = patience
-        self.measured = Measured(step, b)
+        self.measure = StepMeasure(step, b)
         self.worth = worth
         self.goal = 0.0
         self.history: list[float] = []
@@ -143,7 +143,7 @@ class Search:
         """
         self._mark = FALL * norm
         self._since = iteration
-        self.scales = self.measured(self.contact, x, residual, self.load)
+        self.scales = self.measure(self.contact, x, residual, self.load)
         reactions = self.contact.reactions(x, residual)
         self.goal = self.worth.goal(norm, self.scales, x, reactions, begin=iteration == 0)
         force = self.scales.force
@@ -171,7 +171,7 @@ class Search:
         It costs one product. Collective.
         """
         residual = self.load - (self.operator @ x)
-        self.scales = self.measured(self.contact, x, residual, self.load)
+        self.scales = self.measure(self.contact, x, residual, self.load)
         return residual, largest_free(self.comm, residual, self.masked.weights)
 
     def is_certain(self, norm: float) -> bool:
