@@ -200,7 +200,17 @@ class March:
 
         # Forces of the step's balance are formed only if some recorder asks for them.
         averages = partial(scheme.balance, problem, state, free, dt)
-        return Report(problem, state, new, free.v, step, result, certificate, averages, escalated)
+        return Report(
+            problem=problem,
+            old=state,
+            new=new,
+            v_minus=free.v,
+            step=step,
+            result=result,
+            certificate=certificate,
+            averages=averages,
+            escalated=escalated,
+        )
 
 
 def after_impact(

@@ -71,14 +71,14 @@ def join_states(states: Sequence[State]) -> State:
         zero = 0.0 * rubbing[0]
         r_t = np.stack([zero if state.r_t is None else state.r_t for state in states])
     return State(
-        first.t,
-        first.k,
-        freeze(np.stack([state.u for state in states])),
-        freeze(np.stack([state.v for state in states])),
-        np.stack([state.r_n for state in states]),
-        np.stack([state.active for state in states]),
-        memory,
-        r_t,
+        t=first.t,
+        k=first.k,
+        u=freeze(np.stack([state.u for state in states])),
+        v=freeze(np.stack([state.v for state in states])),
+        r_n=np.stack([state.r_n for state in states]),
+        active=np.stack([state.active for state in states]),
+        memory=memory,
+        r_t=r_t,
     )
 
 
@@ -95,7 +95,8 @@ def split_states(
         many: the states as rows.
     """
 
-    def own_state(row: int) -> State:
+    def split_state(row: int) -> State:
+        """Return the state of one run, whose products are rows of those of all."""
         u = many.u[row]
         v = many.v[row]
         products = [("M", v, many.v), ("K", u, many.u)]
@@ -108,7 +109,7 @@ def split_states(
         r_t = None if many.r_t is None else many.r_t[row]
         return State(many.t, many.k, u, v, many.r_n[row], many.active[row], memory, r_t)
 
-    return LazyRows(own_state)
+    return LazyRows(split_state)
 
 
 def split_step(problem: ContactProblem, many: StepProblem, row: int) -> StepProblem:
@@ -121,18 +122,18 @@ def split_step(problem: ContactProblem, many: StepProblem, row: int) -> StepProb
     """
     slip0 = None if many.slip0 is None else many.slip0[row]
     return StepProblem(
-        many.A,
-        many.b[row],
-        many.bound,
-        many.surface,
-        many.scale,
-        many.guess[row],
-        many.active[row],
-        many.t,
-        many.k,
-        problem.friction,
-        slip0,
-        many.rate_factor,
+        A=many.A,
+        b=many.b[row],
+        bound=many.bound,
+        surface=many.surface,
+        scale=many.scale,
+        guess=many.guess[row],
+        active=many.active[row],
+        t=many.t,
+        k=many.k,
+        friction=problem.friction,
+        slip0=slip0,
+        rate_factor=many.rate_factor,
     )
 
 
@@ -167,10 +168,11 @@ def join_loads(problems: Sequence[ContactProblem]) -> Loads:
             places.append((run, number, history))
     vectors = np.array(forces).reshape(len(forces), len(body.constant))
 
-    def rows(t: float) -> Array:
+    def sum_rows(t: float) -> Array:
+        """Return the loads of all runs at time t [s], as rows [N]."""
         factors = np.zeros((len(problems), len(vectors)))
         for run, number, history in places:
             factors[run, number] += history_value(history, t)
         return np.asarray(body(t) + factors @ vectors)
 
-    return Loads(body.constant, rows=rows)
+    return Loads(body.constant, rows=sum_rows)

@@ -103,6 +103,7 @@ class Session:
 
     @property
     def _comm(self) -> Comm:
+        """Return the communicator of the ranks that share the run."""
         return self.method.problem.system.algebra.comm
 
     def settings(self) -> dict[str, Any]:
@@ -427,6 +428,7 @@ class Session:
         none = np.zeros(problem.surface.count)
 
         def linear_step() -> None:
+            """Make a step as if there were no contact."""
             step = scheme.step(problem, old, A, dt)
             result = StepResult(A.factor.solve(step.b), none, none.astype(bool), 0, "linear")
             scheme.finish(problem, old, step, result, dt)

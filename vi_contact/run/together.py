@@ -301,7 +301,8 @@ class Group:
         system = self._problem.equations
         loads = [("load", t, t) for t in system.times]
 
-        def averages(row: int) -> Callable[[], Balance]:
+        def make_averages(row: int) -> Callable[[], Balance]:
+            """Return what makes the balance of one run."""
             problems[row].equations.know_rows(system, row, *loads)
             return partial(scheme.balance, problems[row], old[row], free[row], dt)
 
@@ -310,7 +311,7 @@ class Group:
             "old": old,
             "new": self._states,
             "v_minus": LazyRows(lambda row: free[row].v),
-            "averages": LazyRows(averages),
+            "averages": LazyRows(make_averages),
             "escalated": LazyRows(lambda row: False),
         }
         for row, run in enumerate(self._runs):
@@ -338,14 +339,15 @@ class Group:
             struck = (freeze(new.v) != rows.v).any(axis=1)
             problems = self._problems
 
-            def own_state(row: int) -> State:
+            def split_state(row: int) -> State:
+                """Return the state of one run, with its velocities after the impact."""
                 if not struck[row]:
                     return free[row]
                 v = new.v[row]
                 problems[row].equations.know_rows(problem.equations, row, ("M", v, new.v))
                 return free[row].with_velocity(v)
 
-            return new, LazyRows(own_state)
+            return new, LazyRows(split_state)
 
         # Else run by run, where a point is closed.
         states = []

@@ -114,6 +114,7 @@ def run_folder(comm: Comm, path: str | Path) -> Path:
         )
 
     def make() -> None:
+        """Make the folder on rank 0, write a file into it, and remove that."""
         try:
             folder.mkdir(parents=True, exist_ok=True)
             trial = folder / f".writable-{os.getpid()}"

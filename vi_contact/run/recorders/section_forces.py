@@ -147,7 +147,8 @@ class SectionForces:
         Raises:
             InputError: a cut does not go through the cells.
         """
-        work = self._work = NodalWork("section forces", problem, self.loads, self.gravity)
+        work = NodalWork("section forces", problem, self.loads, self.gravity)
+        self._work = work
         cuts = [find_cut(work.space, label, ends, self.cells) for label, ends in self.cuts.items()]
         work.take([moved for moved, _ in cuts])
         self._turn = block_diag(np.zeros((0, 0)), *(turn for _, turn in cuts))

@@ -117,10 +117,12 @@ class CondensedFriction:
         active = closed > 0.0
 
         def solve(mu: Array, before: FrictionResult | None) -> FrictionResult:
+            """Solve the small problem of all conditions with coefficients mu."""
             guess = active if before is None else before.r
             return self._small.solve(q, cohesion, mu, guess)
 
         def slip_of(answer: FrictionResult) -> Array:
+            """Return the slip of the conditions of this rank."""
             return self._compute_slip(q, answer)[surface.slots]
 
         answer = self._rates.solve(step, rest, slope, solve, slip_of)

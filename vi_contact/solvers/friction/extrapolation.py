@@ -77,6 +77,7 @@ class Anderson:
         points: list[Trial] = []
 
         def choose_next(x: Array, image: Array) -> Array:
+            """Return the point (n,) to try after x, which has this image g(x)."""
             nonlocal count, points
             count += 1
             f = image - x

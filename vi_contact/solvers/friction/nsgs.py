@@ -61,6 +61,7 @@ def make_sweep(step: ScaledProblem) -> Callable[[Array], Array]:
     nodes = [_Node(step, i) for i in range(step.count)]
 
     def sweep(r: Array) -> Array:
+        """Solve for every node in turn, with the last reactions of all others."""
         flat = r.copy().ravel()
         for i, node in enumerate(nodes):
             rows = slice(i * d, (i + 1) * d)
@@ -101,6 +102,7 @@ class _Node:
 
         # Closed: w_n = 0 gives the pressure, which limits r_t; it sticks or slips.
         def pressure(r_t: Array) -> float:
+            """Return r_n of w_n = 0."""
             return float(-(q_n + self.coupling @ r_t) / self.normal)
 
         r_t = minimise_on_disk(
@@ -138,9 +140,11 @@ def minimise_on_disk(S: Array, q: Array, limit: Callable[[Array], float]) -> Arr
     unit = float(np.sum(np.abs(values)))
 
     def reaction(s: float) -> Array:
+        """Return r of (S + lambda) r = -q at s, in the eigenvectors of S."""
         return np.asarray(vectors @ (-s * part / (s * values + (1.0 - s) * unit)))
 
     def outside(s: float) -> float:
+        """Return by how much r is outside its disk."""
         r = reaction(s)
         return float(np.linalg.norm(r)) - limit(r)
 

@@ -84,9 +84,11 @@ class VolumeFriction:
         slope = surface.everywhere(slope_of(rest, surface.weights))
 
         def solve(mu: Array, before: Solution | None) -> Solution:
+            """Solve the step with the coefficients mu of all conditions."""
             return self._solve_sequence(step, cohesion, mu[surface.slots], before)
 
         def slip_of(solution: Solution) -> Array:
+            """Return the slip of the conditions of this rank."""
             return self._friction.by_point(solution.slip)
 
         solution = RateIteration().solve(step, rest, slope, solve, slip_of)

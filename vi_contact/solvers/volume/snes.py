@@ -127,6 +127,7 @@ def weakly(method: Callable[..., Any]) -> Callable[..., Any]:
     reference = weakref.WeakMethod(method)
 
     def call(*arguments: Any) -> Any:
+        """Call the method, while its object lives."""
         alive = reference()
         assert alive is not None, "a PETSc solver outlived its driver"
         return alive(*arguments)
