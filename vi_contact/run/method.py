@@ -1,6 +1,7 @@
-"""Choose and check how a problem is marched.
+"""Choose and check how a problem is marched: scheme, solvers, tolerance, time steps, first state.
 
-This is scheme, solvers, tolerance, time steps, and the state it starts from.
+``choose_method`` serves every function that marches (march, simulate, march_many, …): it names the
+function in its sentences, and fills in what is not said.
 """
 
 from collections.abc import Sequence
@@ -66,7 +67,7 @@ def choose_method(
     Args:
         owner: the function of the user, for sentences of errors.
         problem: what is marched.
-        scheme: None for the one of ``with_defaults``.
+        scheme: None for the one of ``choose_defaults``.
         solvers: the first one, None for Automatic(), and the escalation.
         dt: the time steps [s].
         steps: the number of base steps, or None.
@@ -78,15 +79,17 @@ def choose_method(
         InputError: arguments of the wrong kind, or a state of another problem or inside the
             obstacle.
     """
+    # All ranks were given the same, and of the right kinds.
     check_problem_given(owner, problem)
     comm = problem.surface.comm
+    first, escalation = solvers
     agree(
         comm,
         owner,
         {
             "scheme": scheme,
-            "solver": solvers[0],
-            "escalation": solvers[1],
+            "solver": first,
+            "escalation": escalation,
             "dt": dt,
             "steps": steps,
             "t_end": t_end,
@@ -94,12 +97,15 @@ def choose_method(
             "tolerance": tolerance,
         },
     )
-    check_methods(owner, *solvers, tolerance)
-    problem, scheme = with_defaults(problem, scheme)
-    first, escalation = solvers
+    check_methods(owner, first, escalation, tolerance)
+
+    # Defaults of what is not said.
+    problem, scheme = choose_defaults(problem, scheme)
     if first is None:
         first = Automatic()
     method = Method(problem, scheme, [first, *escalation], dt, tolerance)
+
+    # Scheme, solver and state suit the problem.
     size = plan_steps(dt, steps, t_end, start_time(owner, state)).dt(0)
     with together(comm):  # what is the user's own may fail on one rank
         method.bind()
@@ -108,13 +114,14 @@ def choose_method(
         method.solvers[0].check(problem)
         if state is not None:
             check_state(owner, problem, state, dt=size, tolerance=tolerance, scheme=scheme)
-    # what continues a run was looked at when it began
+
+    # What continues a run was looked at when it began.
     if problem.system.floating and state is None:
         refuse_loose_bodies(problem)
     return method
 
 
-def with_defaults(
+def choose_defaults(
     problem: ContactProblem, scheme: Scheme | None, others: Sequence[ContactProblem] = ()
 ) -> tuple[ContactProblem, Scheme]:
     """Return (the problem with a mass matrix, the scheme to run it with).
