@@ -264,7 +264,10 @@ def test_the_batch_script_of_the_guide(tmp_path: Path) -> None:
 def test_the_age_is_that_of_the_process() -> None:
     """A process that has slept before it imports anything is at least so old, and no older than who
     has started it."""
-    code = "import time\ntime.sleep(0.5)\nfrom vi_contact.run.wall_time import age\nprint(age())"
+    code = (
+        "import time\ntime.sleep(0.5)\nfrom vi_contact.run.wall_time import measure_age\n"
+        "print(measure_age())"
+    )
     begin = time.monotonic()
     said = subprocess.run(
         [sys.executable, "-c", code],
