@@ -28,7 +28,7 @@ from vi_contact.fem.mesh.communicators import MpiComm
 from vi_contact.laws.impact import ImpulseUpdate, Inelastic
 from vi_contact.laws.mass import Redistributed
 from vi_contact.run.march import march
-from vi_contact.run.method import choose_defaults
+from vi_contact.run.method import with_defaults
 from vi_contact.run.recorders import Energy
 from vi_contact.run.recorders.steps import Steps
 from vi_contact.solvers.iterative.preconditioners import KINDS
@@ -160,7 +160,7 @@ STEPPED: dict[str, tuple[dict[str, Any], Any, float]] = {
 def test_steps_with_their_ledger(name: str, traffic: Traffic) -> None:
     """From the start of a run on, after mass was moved and the system turned."""
     data, scheme, most = STEPPED[name]
-    problem, scheme = choose_defaults(box(**data), scheme)
+    problem, scheme = with_defaults(box(**data), scheme)
     assert problem.equations.rows >= 0
     recorders: list[Any] = [Steps(), Energy()]
     traffic.begin()
@@ -192,7 +192,7 @@ def test_a_gravity_stage(traffic: Traffic) -> None:
 def test_a_whole_run(traffic: Traffic) -> None:
     """To its summary, without arrays of the contact points in its histories; a linear step is not
     timed."""
-    problem, _ = choose_defaults(box(), None)
+    problem, _ = with_defaults(box(), None)
     assert problem.equations.rows >= 0
     traffic.begin()
     record = [Energy()]

@@ -42,7 +42,7 @@ def march(
 
     Args:
         problem: what is marched. If it names no mass matrix, or there is no scheme,
-            ``run.method.choose_defaults`` chooses them, and ``report.problem`` has them.
+            ``run.method.with_defaults`` chooses them, and ``report.problem`` has them.
         scheme: the time scheme.
         solver: of the steps; None means Automatic().
         dt: constant [s], or a Schedule, or HalvedAtImpact.

@@ -12,7 +12,7 @@ from ..core.problem import ContactProblem
 from ..core.state_checks import initial_state
 from ..core.step import Report, Scheme, Solver, State
 from ..solvers.certified import TOLERANCE
-from .method import choose_defaults, choose_method
+from .method import choose_method, with_defaults
 from .time_steps import TimeSteps, plan_steps
 from .together import Together, group_runs
 
@@ -63,7 +63,7 @@ def march_many(
     starts = _spread("states", states, len(checked))
     runs: list[Together] = []
     for problem, count, end, state in zip(checked, steps_of_runs, ends, starts, strict=True):
-        problem, scheme = choose_defaults(problem, scheme, [run.method.problem for run in runs])
+        problem, scheme = with_defaults(problem, scheme, [run.method.problem for run in runs])
         method = choose_method(
             "march_many",
             problem,

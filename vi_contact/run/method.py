@@ -67,7 +67,7 @@ def choose_method(
     Args:
         owner: the function of the user, for sentences of errors.
         problem: what is marched.
-        scheme: None for the one of ``choose_defaults``.
+        scheme: None for the one of ``with_defaults``.
         solvers: the first one, None for Automatic(), and the escalation.
         dt: the time steps [s].
         steps: the number of base steps, or None.
@@ -100,7 +100,7 @@ def choose_method(
     check_methods(owner, first, escalation, tolerance)
 
     # Defaults of what is not said.
-    problem, scheme = choose_defaults(problem, scheme)
+    problem, scheme = with_defaults(problem, scheme)
     if first is None:
         first = Automatic()
     method = Method(problem, scheme, [first, *escalation], dt, tolerance)
@@ -121,7 +121,7 @@ def choose_method(
     return method
 
 
-def choose_defaults(
+def with_defaults(
     problem: ContactProblem, scheme: Scheme | None, others: Sequence[ContactProblem] = ()
 ) -> tuple[ContactProblem, Scheme]:
     """Return (the problem with a mass matrix, the scheme to run it with).

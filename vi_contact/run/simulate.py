@@ -36,7 +36,7 @@ from .files.folder import HISTORY_H5, lock_folder, run_folder
 from .files.stored_rows import StoredRows
 from .files.table import Block, Table
 from .files.writer import FieldWriter, Writer
-from .method import Method, choose_defaults, choose_method
+from .method import Method, choose_method, with_defaults
 from .recorders import Contact, Energy
 from .recorders.steps import Steps
 from .request import CrossCheck, RunRequest
@@ -79,7 +79,7 @@ def simulate(
         problem: what is marched.
         scheme: None means the trapezoidal rule on redistributed mass, or with an impact law the
             Zienkiewicz-Wood-Taylor step. A problem that names no mass matrix gets the one of the
-            scheme (``run.method.choose_defaults``).
+            scheme (``run.method.with_defaults``).
         solver: None means Automatic().
         dt: time step [s], or a plan: Schedule, HalvedAtImpact. ``steps``, t_end and
             checkpoint_every count base steps.
@@ -209,7 +209,7 @@ def open_run(
 
 def _choose_method(request: RunRequest, others: Sequence[ContactProblem]) -> Method:
     """Return how the run is marched, checked; ``others`` lend their matrices. Collective."""
-    problem, scheme = choose_defaults(request.problem, request.scheme, others)
+    problem, scheme = with_defaults(request.problem, request.scheme, others)
     return choose_method(
         "simulate",
         problem,

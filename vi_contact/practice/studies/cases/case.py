@@ -43,7 +43,7 @@ from ....meshes.gmsh_session import MeshScript
 from ....run.cross_check import CrossChecked
 from ....run.files.folder import lock_folder, refuse_files_of_others, run_folder
 from ....run.files.writer import FieldWriter
-from ....run.method import choose_defaults
+from ....run.method import with_defaults
 from ....run.recorders import Contact, Energy
 from ....run.recorders.steps import Steps
 from ....run.simulate import Solution, simulate
@@ -179,7 +179,7 @@ class Case:
         problem = self._problem(parts)
         own = self._recorders(parts)
         recorders = [Steps(), *((Energy(), Contact()) if own is None else own)]
-        problem, _ = choose_defaults(problem, self._scheme())
+        problem, _ = with_defaults(problem, self._scheme())
         state = initial_state(problem)
         return frozenset(
             name
