@@ -70,7 +70,7 @@ def raising(error: BaseException) -> Callable[..., Any]:
 WHERE = (
     "vi_contact.run.files.reading.read_bytes",
     "vi_contact.run.files.reading.open_hdf5",
-    "vi_contact.run.files.reading.numbers_of",
+    "vi_contact.run.files.reading.parse_numbers",
     "vi_contact.practice.plots.deformed.open_hdf5",
     "vi_contact.core.hdf5.StoredGroup.__getitem__",
     "vi_contact.practice.studies.report.sketch",
@@ -99,7 +99,7 @@ def test_no_memory_is_no_damage(
 
 
 @pytest.mark.parametrize("error", MEMORY, ids=repr)
-@pytest.mark.parametrize("place", ["open_to_read", "np.load", "checksum"])
+@pytest.mark.parametrize("place", ["open_to_read", "np.load", "compute_checksum"])
 def test_a_checkpoint_that_does_not_fit_is_not_damaged(
     tmp_path: Path, place: str, error: Exception, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -29,8 +29,8 @@ from vi_contact.fem.matrices.petsc_algebra import (
 from vi_contact.fem.matrices.petsc_rows import aij_of
 from vi_contact.kernels import compiler
 from vi_contact.solvers import ReducedNewton, SemismoothNewton, TaoTron
-from vi_contact.solvers.volume.failures import petsc_failure
-from vi_contact.solvers.volume.options import direct as direct_of_volume
+from vi_contact.solvers.volume.failures import make_petsc_failure
+from vi_contact.solvers.volume.options import choose_direct as direct_of_volume
 
 COMM = MPI.COMM_WORLD
 EVERY = packages.petsc_has
@@ -246,10 +246,10 @@ def test_errors_of_petsc_keep_their_causes():
     ):
         with pytest.raises(InputError, match=said):
             raise direct.failure(None, A, error(code, text))
-    assert "no memory left" in str(petsc_failure("Volume", error(55, "Memory requested 1")))
-    assert "zero pivot" in str(petsc_failure("Volume", error(71, "Zero pivot row 3")))
+    assert "no memory left" in str(make_petsc_failure("Volume", error(55, "Memory requested 1")))
+    assert "zero pivot" in str(make_petsc_failure("Volume", error(71, "Zero pivot row 3")))
     assert "positive definite" not in str(
-        petsc_failure("Volume", error(92, "Could not locate solver type mumps"))
+        make_petsc_failure("Volume", error(92, "Could not locate solver type mumps"))
     )
 
 

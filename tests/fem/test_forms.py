@@ -37,7 +37,7 @@ from vi_contact.laws import (
 )
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.practice.plots.deformed import read_frames
-from vi_contact.run.files.identity import differences, identity
+from vi_contact.run.files.identity import find_differences, identify
 from vi_contact.run.modal import lowest_frequency
 from vi_contact.solvers import Lemke
 from vi_contact.solvers.volume import ReducedNewton, SemismoothNewton, TaoTron, Volume
@@ -421,14 +421,14 @@ def test_a_restart_sees_the_sense_of_a_skew_damping(comm: Any) -> None:
         own = replace(
             isotropic(mesh), damping=lambda u, v: spin * (u[0] * v[1] - u[1] * v[0]) * ufl.dx
         )
-        return identity(
+        return identify(
             linear(fem.assemble(mesh, forms=own)), vc.Midpoint(), 1e-3, start=0.0, end=1e-2
         )
 
     first = facts(3e3)
-    assert differences(first, facts(3e3)) == {}
+    assert find_differences(first, facts(3e3)) == {}
     for other in (-3e3, 6e3):
-        assert differences(first, facts(other)) == {"damping": "another damping"}
+        assert find_differences(first, facts(other)) == {"damping": "another damping"}
 
 
 @pytest.mark.serial

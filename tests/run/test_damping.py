@@ -23,7 +23,7 @@ from vi_contact.practice.engineering import first_modes
 from vi_contact.practice.ground_motion.record import Record
 from vi_contact.practice.studies import read_case
 from vi_contact.practice.studies.cases.description import describe
-from vi_contact.run.damping import damping_in_words
+from vi_contact.run.damping import describe_damping
 
 COMM = MPI.COMM_WORLD
 E, NU, RHO, XI = 1.8e9, 0.2, 2000.0, 0.05
@@ -116,13 +116,13 @@ def test_every_material_has_a_ratio(material: Any, second: float) -> None:
 def test_laws_of_the_whole_body(law: Any, words: str) -> None:
     """The ratio of Rayleigh's law at the frequency of each mode; none without a law."""
     problem = column(damping=law)
-    assert damping_in_words(problem) == words
+    assert describe_damping(problem) == words
     modes = first_modes(problem)
     alpha, beta = law.coefficients(vc.LinearElastic(E, NU, RHO))
     w = 2.0 * np.pi / np.array(modes.periods)
     assert modes.ratios == pytest.approx(0.5 * (alpha / w + beta * w), rel=1e-8)
-    assert damping_in_words(problem).startswith(words)
-    assert (" at T1 = " in damping_in_words(problem)) == (words != "none")
+    assert describe_damping(problem).startswith(words)
+    assert (" at T1 = " in describe_damping(problem)) == (words != "none")
 
 
 def test_dashpots_count() -> None:

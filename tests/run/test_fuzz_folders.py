@@ -26,7 +26,7 @@ from marched_chain import chain, difference, run
 
 from vi_contact.core.errors import InputError
 from vi_contact.core.step import State
-from vi_contact.run.files.checkpoint import checksum, read_checkpoint
+from vi_contact.run.files.checkpoint import compute_checksum, read_checkpoint
 from vi_contact.run.files.reading import read_run
 from vi_contact.run.files.writer import Writer
 from vi_contact.run.simulate import Solution
@@ -164,7 +164,7 @@ def archive(arrays: Arrays, dice: Dice) -> bytes:
     buffer = io.BytesIO()
     if dice.random() < 0.5:
         arrays = {name: values for name, values in arrays.items() if name != "checksum"}
-        arrays["checksum"] = np.array(checksum(arrays))
+        arrays["checksum"] = np.array(compute_checksum(arrays))
     save: Callable[..., None] = np.savez_compressed if dice.random() < 0.2 else np.savez
     save(buffer, **arrays)
     return buffer.getvalue()

@@ -11,7 +11,7 @@ import pytest
 from marched_chain import run, run_wall, wall
 from summaries import summary_of
 
-from vi_contact.run.memory import in_words, memory
+from vi_contact.run.memory import describe_memory, measure_memory
 
 
 def test_the_summary_counts_the_bytes(comm: Any, shared_tmp: Path) -> None:
@@ -33,7 +33,7 @@ def test_the_summary_counts_the_bytes(comm: Any, shared_tmp: Path) -> None:
     if comm.rank == 0:
         assert summary_of(shared_tmp)["memory"] == found
         told = (shared_tmp / "run.log").read_text()
-        assert told.count("INFO memory [MB]: at most ") == 2 and in_words(found) in told
+        assert told.count("INFO memory [MB]: at most ") == 2 and describe_memory(found) in told
         assert re.search(
             r"set up: .*mesh [\d.e-]+ s, assembling [\d.e-]+ s, contact [\d.e-]+ s, mass ", told
         )
@@ -52,4 +52,4 @@ def test_what_nothing_tells_is_left_out(tmp_path: Path) -> None:
 def test_memory_before_a_step(comm: Any) -> None:
     """Without a step there is neither A nor a factor."""
     pytest.importorskip("dolfinx")
-    assert set(memory(wall(comm), None)["bytes"]) == {"K", "M", "mesh"}
+    assert set(measure_memory(wall(comm), None)["bytes"]) == {"K", "M", "mesh"}

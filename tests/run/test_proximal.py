@@ -272,7 +272,8 @@ def test_a_step_after_one_that_moved_nothing_is_not_prolonged() -> None:
     proximal = Proximal(problem, A, Condensed(), 1e-9)
     u, none = np.zeros(system.rows), np.zeros(surface.count, dtype=bool)
     proximal.step = StepProblem(A, u, surface.gap(0.0), surface, 1.0, u, none, 0.0, 0)
-    rest, moved = proximal._motion(u, none), proximal._motion(u + 1.0, none)
+    rest = proximal._measure_motion(u, none)
+    moved = proximal._measure_motion(u + 1.0, none)
     answer = StepResult(u, np.zeros(surface.count), none, 1, "")
-    assert rest.pace == 0.0 < moved.pace and proximal._ahead(rest, moved, answer) == 0.0
-    assert proximal._ahead(moved, moved, answer) > 0.0
+    assert rest.pace == 0.0 < moved.pace and proximal._look_ahead(rest, moved, answer) == 0.0
+    assert proximal._look_ahead(moved, moved, answer) > 0.0

@@ -19,8 +19,8 @@ from vi_contact.core.problem import ContactProblem
 from vi_contact.laws.excitation import Harmonic, Tabulated
 from vi_contact.laws.friction import Coulomb, ExponentialDecay, SlipRateCoulomb
 from vi_contact.laws.impact import Elastic
-from vi_contact.run.files.checkpoint import checksum
-from vi_contact.run.files.identity import differences, identity, text_of
+from vi_contact.run.files.checkpoint import compute_checksum
+from vi_contact.run.files.identity import find_differences, identify, write_as_text
 from vi_contact.run.simulate import simulate
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.trapezoidal import Trapezoidal
@@ -111,12 +111,12 @@ def test_what_may_differ(left: Path, tmp_path: Path) -> None:
 def test_one_sample_of_a_record() -> None:
     """One of 5000 samples is another."""
     one, two = (
-        identity(chain(excitation=tabulated(peak)), SS22(), 5e-3, start=0.0, end=20.0)
+        identify(chain(excitation=tabulated(peak)), SS22(), 5e-3, start=0.0, end=20.0)
         for peak in (0.3, 0.4)
     )
-    assert differences(one, two) == {"excitation": "another excitation"} and not differences(
-        one, one
-    )
+    assert find_differences(one, two) == {
+        "excitation": "another excitation"
+    } and not find_differences(one, one)
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ def test_texts_of_laws() -> None:
     class Own:
         """Has the repr that Python gives it."""
 
-    assert "0x" not in text_of(Own()) and text_of(Own()) == text_of(Own())
+    assert "0x" not in write_as_text(Own()) and write_as_text(Own()) == write_as_text(Own())
 
     @dataclass
     class Law:
@@ -163,16 +163,16 @@ def test_texts_of_laws() -> None:
             return self.text
 
     ours: dict[str, Any] = {
-        "law": text_of(Law("Law(mu=np.float64(0.30000000000000004), many=(1e-3, inf))"))
+        "law": write_as_text(Law("Law(mu=np.float64(0.30000000000000004), many=(1e-3, inf))"))
     }
-    assert not differences(ours, {"law": "Law(mu=0.3, many=(0.001, inf))"})
+    assert not find_differences(ours, {"law": "Law(mu=0.3, many=(0.001, inf))"})
     for other in (
         "Law(mu=0.31, many=(0.001, inf))",
         "Law(mu=0.3, many=(0.001, nan))",
         "Law(mu=0.3, many=(0.001,))",
     ):
-        assert differences(ours, {"law": other})
-    assert differences({"numbers": [(1.0, 2.0)]}, {"numbers": "none"})
+        assert find_differences(ours, {"law": other})
+    assert find_differences({"numbers": [(1.0, 2.0)]}, {"numbers": "none"})
 
 
 def crafted(folder: Path, change: Callable[[dict[str, Any]], None]) -> None:
@@ -182,7 +182,7 @@ def crafted(folder: Path, change: Callable[[dict[str, Any]], None]) -> None:
         arrays = {name: stored[name] for name in stored.files if name != "checksum"}
     change(arrays)
     buffer = io.BytesIO()
-    np.savez(buffer, checksum=np.array(checksum(arrays)), **arrays)
+    np.savez(buffer, checksum=np.array(compute_checksum(arrays)), **arrays)
     path.write_bytes(buffer.getvalue())
 
 
@@ -250,9 +250,9 @@ def test_checksum_sees_everything() -> None:
         one | {"a": one["a"].reshape(2, 2)},
         one | {"a": np.array([0.0, 1.0, 2.0, np.nextafter(3.0, 4.0)])},
     ]
-    assert len({checksum(found) for found in (one, *others)}) == 5 and checksum(one) == checksum(
-        dict(one)
-    )
+    assert len({compute_checksum(found) for found in (one, *others)}) == 5 and compute_checksum(
+        one
+    ) == compute_checksum(dict(one))
 
 
 # Any number of ranks
@@ -265,7 +265,7 @@ def test_other_ranks_are_the_same_problem(comm: Any) -> None:
     from mpi4py import MPI
 
     def numbers(problem: ContactProblem) -> dict[str, Any]:
-        return identity(problem, ZienkiewiczWoodTaylor(), 1e-3, start=0.0, end=0.5)
+        return identify(problem, ZienkiewiczWoodTaylor(), 1e-3, start=0.0, end=0.5)
 
     def rough(ranks: Any) -> ContactProblem:
         box = rubbing_box(ranks, None)
@@ -278,7 +278,7 @@ def test_other_ranks_are_the_same_problem(comm: Any) -> None:
         rough,
     ):
         spread, alone = numbers(make(comm)), numbers(make(MPI.COMM_SELF))
-        assert not differences(spread, alone) and spread.keys() == alone.keys()
+        assert not find_differences(spread, alone) and spread.keys() == alone.keys()
         for name, own in alone.items():
             for (a, size), (b, _) in (
                 zip(own, spread[name], strict=True) if isinstance(own, list) else ()

@@ -23,7 +23,7 @@ from vi_contact.core.step import Report
 from vi_contact.laws.impact import ImpulseUpdate, Inelastic
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.run.recorders import Energy
-from vi_contact.run.time_steps import HalvedAtImpact, Schedule, StepPlan, step_plan
+from vi_contact.run.time_steps import HalvedAtImpact, Schedule, StepPlan, plan_steps
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.trapezoidal import Trapezoidal
@@ -57,9 +57,9 @@ LONG = Schedule(((4e-3, 0.4), (1e-3, 0.6), (2.5e-3, inf)))  # contacts open and 
     ],
 )
 def test_steps_of_a_constant_dt(dt, steps, t_end, t0, expected):
-    assert step_plan(dt, steps, t_end, t0) == StepPlan(((dt, expected),))
-    assert step_plan(HalvedAtImpact(dt, 4), steps, t_end, t0) == StepPlan(((dt, expected),), 4)
-    assert step_plan(Schedule(((dt, inf),)), steps, t_end, t0) == StepPlan(((dt, expected),))
+    assert plan_steps(dt, steps, t_end, t0) == StepPlan(((dt, expected),))
+    assert plan_steps(HalvedAtImpact(dt, 4), steps, t_end, t0) == StepPlan(((dt, expected),), 4)
+    assert plan_steps(Schedule(((dt, inf),)), steps, t_end, t0) == StepPlan(((dt, expected),))
 
 
 @serial
@@ -80,7 +80,7 @@ def test_steps_of_a_constant_dt(dt, steps, t_end, t0, expected):
 )
 def test_steps_of_a_schedule(steps, t_end, t0, parts):
     """A piece ends with the first step that reaches its time."""
-    found = step_plan(THREE, steps, t_end, t0)
+    found = plan_steps(THREE, steps, t_end, t0)
     assert found.parts == parts and found.steps == sum(count for _, count in parts)
     sizes = [dt for dt, count in parts for _ in range(count)]
     assert [found.dt(base) for base in range(found.steps)] == sizes and found.dt(
@@ -96,10 +96,10 @@ def test_round_off_of_many_pieces_adds_no_step(t0):
     sizes = [1e-3 * (1.0 + 0.01 * i) for i in range(100)]
     ends = [t0 + 12.0 * sum(sizes[: i + 1]) for i in range(100)]
     plan = Schedule(tuple(zip(sizes, ends, strict=True)))
-    assert step_plan(plan, None, ends[-1], t0) == StepPlan(tuple((size, 12) for size in sizes))
-    assert step_plan(plan, None, ends[-1] + 1e-10, t0 - 1e-10).steps == 1200
+    assert plan_steps(plan, None, ends[-1], t0) == StepPlan(tuple((size, 12) for size in sizes))
+    assert plan_steps(plan, None, ends[-1] + 1e-10, t0 - 1e-10).steps == 1200
     thirds = Schedule(tuple((1.0 / 300.0, t0 + (i + 1) / 25.0) for i in range(100)))
-    assert step_plan(thirds, None, t0 + 4.0, t0).steps == 1200
+    assert plan_steps(thirds, None, t0 + 4.0, t0).steps == 1200
 
 
 @serial
@@ -160,7 +160,7 @@ def test_round_off_of_many_pieces_adds_no_step(t0):
 )
 def test_nonsense_is_named(dt, steps, t_end, word):
     with pytest.raises(InputError, match=word):
-        step_plan(dt, steps, t_end)
+        plan_steps(dt, steps, t_end)
     with pytest.raises(InputError, match=word):
         run_chain(None, steps, t_end=t_end, dt=dt)
 

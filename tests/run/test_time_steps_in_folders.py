@@ -18,7 +18,7 @@ from vi_contact.core.state_checks import initial_state
 from vi_contact.run.march import March
 from vi_contact.run.method import Method
 from vi_contact.run.recorders import Energy
-from vi_contact.run.time_steps import HalvedAtImpact, Schedule, step_plan
+from vi_contact.run.time_steps import HalvedAtImpact, Schedule, plan_steps
 from vi_contact.schemes.linear_multistep import LinearMultistep
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
@@ -74,11 +74,11 @@ def test_restart_with_a_plan_to_the_last_bit(tmp_path: Path, scheme: Any, plan: 
     straight run."""
     straight = run_chain(tmp_path / "straight", 200, scheme=scheme, dt=plan)
     method = Method(chain(), scheme, [Condensed()], plan, tolerance=1e-9)
-    loop = March(method, step_plan(plan, 199, None), initial_state(chain()))
+    loop = March(method, plan_steps(plan, 199, None), initial_state(chain()))
     halved = [
         loop.base
         for _ in loop
-        if loop.ended and loop.dt < step_plan(plan, 199, None).dt(loop.base - 1)
+        if loop.ended and loop.dt < plan_steps(plan, 199, None).dt(loop.base - 1)
     ]
     assert bool(halved) == isinstance(plan, HalvedAtImpact)
     stops = sorted({50, 101, *halved[:2]})

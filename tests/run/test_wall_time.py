@@ -23,7 +23,7 @@ from vi_contact.core.errors import InputError, Interrupted, OutOfTime
 from vi_contact.practice.cli.entry import main
 from vi_contact.run import wall_time as watch
 from vi_contact.run.recorders import Contact, Energy
-from vi_contact.run.wall_time import WallTime, age, seconds_of
+from vi_contact.run.wall_time import WallTime, measure_age, parse_wall_time
 
 serial = pytest.mark.serial
 PACKAGE = str(Path(__file__).parents[2])
@@ -53,7 +53,7 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Iterator[Clock]:
     found = Clock()
-    monkeypatch.setattr(watch, "age", found)
+    monkeypatch.setattr(watch, "measure_age", found)
     yield found
 
 
@@ -74,7 +74,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Iterator[Clock]:
 def test_slurm_reads_it_so(text: str, seconds: float) -> None:
     """The six forms of sbatch(1), --time: the same digits mean minutes first without days, hours
     first with them."""
-    assert seconds_of(text) == seconds
+    assert parse_wall_time(text) == seconds
 
 
 @serial
@@ -199,7 +199,7 @@ def test_the_command(
     """Status 75 and one sentence; what is no wall time is refused."""
     pytest.importorskip("dolfinx")
     monkeypatch.setattr("vi_contact.practice.cli.entry.world", SerialComm)
-    monkeypatch.setattr(watch, "age", Clock(300.0))
+    monkeypatch.setattr(watch, "measure_age", Clock(300.0))
     short = ["run", "wall", "--steps", "3", "--quiet", "--out", str(tmp_path / "wall")]
     assert main([*short, "--wall-time", "0:05:00"]) == 75
     said = capsys.readouterr()
@@ -264,7 +264,10 @@ def test_the_batch_script_of_the_guide(tmp_path: Path) -> None:
 def test_the_age_is_that_of_the_process() -> None:
     """A process that has slept before it imports anything is at least so old, and no older than who
     has started it."""
-    code = "import time\ntime.sleep(0.5)\nfrom vi_contact.run.wall_time import age\nprint(age())"
+    code = (
+        "import time\ntime.sleep(0.5)\nfrom vi_contact.run.wall_time import measure_age\n"
+        "print(measure_age())"
+    )
     begin = time.monotonic()
     said = subprocess.run(
         [sys.executable, "-c", code],
@@ -275,4 +278,4 @@ def test_the_age_is_that_of_the_process() -> None:
     ).stdout
     # a tick of the kernel is a hundredth of a second
     assert 0.5 <= float(said) <= time.monotonic() - begin + 0.1
-    assert age() >= float(said)
+    assert measure_age() >= float(said)

@@ -28,7 +28,7 @@ from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.impact import ImpulseUpdate, Inelastic
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.run.files.checkpoint import RestartPoint, read_checkpoint, write_checkpoint
-from vi_contact.run.files.identity import identity
+from vi_contact.run.files.identity import identify
 from vi_contact.run.static import static_equilibrium
 from vi_contact.schemes.consistent_data import consistent_acceleration
 from vi_contact.schemes.generalised_alpha import GeneralisedAlpha
@@ -248,7 +248,7 @@ def test_restart_from_a_checkpoint(tmp_path: Path, mass: Any, scheme: Any) -> No
     assert any(state.active.any() for state in states[70:90])
     assert all(isinstance(array, np.ndarray) for array in states[80].memory.values())
     start, end = states[0].t, states[-1].t
-    run_of = {"run": identity(problem, scheme, 1 / 60, start=start, end=end), "span": (start, end)}
+    run_of = {"run": identify(problem, scheme, 1 / 60, start=start, end=end), "span": (start, end)}
     place = RestartPoint(states[80], states[80].t, states[80].k)
     write_checkpoint(tmp_path, problem, place, run_of=run_of)
     state = read_checkpoint(tmp_path, problem, scheme=scheme, dt=1 / 60)[0].state

@@ -116,8 +116,8 @@ def test_iterations_count_changes_of_the_set_and_history_the_rows():
 def test_the_same_set_is_not_factored_twice(monkeypatch):
     """Prepared once, marching with an unchanged set: triangular solves only."""
     monkeypatch.setattr(active_set, "load_loops", lambda comm: None)
-    calls, original = [], active_set.cholesky
-    monkeypatch.setattr(active_set, "cholesky", lambda G: calls.append(G.shape[0]) or original(G))
+    calls, original = [], active_set.factorise
+    monkeypatch.setattr(active_set, "factorise", lambda G: calls.append(G.shape[0]) or original(G))
     rng = np.random.default_rng(9)
     problem = generic(rng, 12)
     prepared = ActiveSet().prepare(problem.G, problem.bilateral)

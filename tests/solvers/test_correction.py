@@ -22,7 +22,7 @@ from vi_contact.schemes.moreau_jean import MoreauJean
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.certified import NEAR, TOLERANCE, CertifiedSolver
 from vi_contact.solvers.condensed import Condensed
-from vi_contact.solvers.correction import Share, add, left_over, share_of
+from vi_contact.solvers.correction import Share, add, choose_share, pose_remainder
 from vi_contact.solvers.friction.nsgs import NSGS
 from vi_contact.solvers.volume.route import ReducedNewton, Volume
 
@@ -119,7 +119,7 @@ def test_what_is_left_over_is_a_step_of_the_contract() -> None:
     exact = solver.solve(step)
     for share in (1.0, 2.0**-4, 2.0**-10):
         start = spoilt(step, exact, 0.3 * share)
-        found = add(step, start, solver.solve(left_over(step, start, share)), share)
+        found = add(step, start, solver.solve(pose_remainder(step, start, share)), share)
         assert kkt_residual(step, found).worst < 1e-12
         assert max_over_ranks(COMM, found.x - exact.x) < 1e-11 * max_over_ranks(COMM, exact.x)
 
@@ -137,7 +137,7 @@ def test_garbage_is_not_corrected() -> None:
 @pytest.mark.serial
 def test_shares_are_powers_of_two_that_leave_room() -> None:
     for residual in (0.0, 1e-15, 3e-9, 1e-4, 0.5, np.inf):
-        share = share_of(residual)
+        share = choose_share(residual)
         assert np.log2(share) == round(np.log2(share)) and 2.0**-30 <= share <= 1.0
         assert share == 1.0 or share >= 1000.0 * residual
 

@@ -223,13 +223,13 @@ def test_places_that_are_left_solve_the_problem_too(d: int, held: float, monkeyp
     """Where most places hold, the small matrix of the others gives the answer of the large one, to
     rounding."""
     rests = []
-    rest = friction_linear.Factored._rest
+    rest = friction_linear.Factored._form_rest
 
     def counted(*arguments: Any) -> Any:
         rests.append(rest(*arguments))
         return rests[-1]
 
-    monkeypatch.setattr(friction_linear.Factored, "_rest", counted)
+    monkeypatch.setattr(friction_linear.Factored, "_form_rest", counted)
     monkeypatch.setattr(friction_newton, "load_loops", lambda comm: None)
     for seed in range(8):
         (G, q, bilateral), results = small(700 + seed, 12, d), []

@@ -21,7 +21,7 @@ from vi_contact.core.verify import kkt_residual
 from vi_contact.solvers import Iterative
 from vi_contact.solvers.iterative.conjugate_gradients import format_residuals
 from vi_contact.solvers.iterative.layout import Nodewise
-from vi_contact.solvers.iterative.preconditioners import KINDS, choose, courant
+from vi_contact.solvers.iterative.preconditioners import KINDS, choose_kind, compute_courant
 
 M = 8  # contact points of pushed_block
 HALF = np.array([0.3, 0.0] * 4)
@@ -330,14 +330,14 @@ def test_blocks_of_whole_nodes_multiply_alike(ids: Any) -> None:
     assert layout.complete == (n == 8) and layout.size == 2 * len(np.unique(ids // 2)) == n + len(
         layout.missing
     )
-    assert np.array_equal(layout.stripped(layout.padded(x)), x)
+    assert np.array_equal(layout.strip(layout.pad(x)), x)
     for mat in (nodewise.blocks(), nodewise.entries()):
         vx, vy = mat.createVecs()
-        vx.array[:] = layout.padded(x)
+        vx.array[:] = layout.pad(x)
         mat.mult(vx, vy)
         assert mat.getBlockSize() == 2
         assert (
-            np.max(np.abs(layout.stripped(vy.array_r) - half @ half.T @ x))
+            np.max(np.abs(layout.strip(vy.array_r) - half @ half.T @ x))
             <= 1e-13 * np.abs(half).sum() ** 2
         )
         assert not np.any(vy.array_r[layout.missing])
@@ -349,11 +349,11 @@ def test_the_courant_number_follows_the_matrices() -> None:
     not a number."""
     M, K = SerialMatrix(np.diag([1.0, 0.0, 3.0, 4.0])), np.diag([100.0, 200.0, 300.0, 200.0])
     A = effective(2.0 * M.csr.toarray() + 2.0 * K, range(4), (2.0, M))
-    assert courant(A) == pytest.approx(10.0, rel=1e-14)
-    assert courant(effective(K, range(4), (0.0, M))) == np.inf
-    assert np.isnan(courant(effective(K, range(4))))
+    assert compute_courant(A) == pytest.approx(10.0, rel=1e-14)
+    assert compute_courant(effective(K, range(4), (0.0, M))) == np.inf
+    assert np.isnan(compute_courant(effective(K, range(4))))
     numbers = (0.1, 0.5, 0.6, 30.0, 31.0, np.inf, np.nan)
-    assert [choose(one, modes=True) for one in numbers] == [
+    assert [choose_kind(one, modes=True) for one in numbers] == [
         "jacobi",
         "jacobi",
         "icc",
@@ -362,4 +362,4 @@ def test_the_courant_number_follows_the_matrices() -> None:
         "gamg",
         "icc",
     ]
-    assert choose(np.inf, modes=False) == "icc"
+    assert choose_kind(np.inf, modes=False) == "icc"

@@ -19,7 +19,7 @@ import vi_contact as vc
 from vi_contact.core.verify import kkt_residual
 from vi_contact.solvers import Iterative
 from vi_contact.solvers.iterative.layout import Nodewise
-from vi_contact.solvers.iterative.preconditioners import KINDS, rigid_modes
+from vi_contact.solvers.iterative.preconditioners import KINDS, make_rigid_modes
 from vi_contact.solvers.volume import ReducedNewton
 
 COMM = MPI.COMM_WORLD
@@ -122,7 +122,7 @@ def test_rigid_modes_in_turned_and_relative_unknowns(name: str) -> None:
     A = system.effective(m=0.0, c=0.0, k=1.0)
     nodewise = Nodewise(A)
     matrix = nodewise.entries()
-    modes = rigid_modes(A, surface, nodewise.layout, matrix.createVecLeft())
+    modes = make_rigid_modes(A, surface, nodewise.layout, matrix.createVecLeft())
     d = system.space.dimension
     assert len(modes) == d * (d + 1) // 2
     assert np.allclose([[a.dot(b) for a in modes] for b in modes], np.eye(len(modes)), atol=1e-13)

@@ -9,7 +9,7 @@ from scipy.sparse import csr_matrix
 
 from vi_contact.core.errors import InputError
 from vi_contact.solvers.friction.problem import ScaledDelassus
-from vi_contact.solvers.normal.lcp import energy_scale, scaled_dense
+from vi_contact.solvers.normal.lcp import compute_scale, scale_dense
 
 pytestmark = pytest.mark.serial
 
@@ -81,15 +81,15 @@ def test_a_problem_checks_its_numbers_when_it_is_made():
 
 def test_dense_scaling_has_unit_diagonal_and_refuses_unsymmetric_matrices():
     G = np.array([[4.0, 1.0], [1.0, 9.0]])
-    scaled = scaled_dense(G, UNILATERAL)
+    scaled = scale_dense(G, UNILATERAL)
     assert scaled.matrix == pytest.approx(np.array([[1.0, 1.0 / 6.0], [1.0 / 6.0, 1.0]]), rel=1e-15)
-    assert energy_scale(G) == pytest.approx(np.array([0.5, 1.0 / 3.0]), rel=1e-15)
+    assert compute_scale(G) == pytest.approx(np.array([0.5, 1.0 / 3.0]), rel=1e-15)
     with pytest.raises(InputError, match="not symmetric"):
-        scaled_dense(np.array([[4.0, 1.0], [1.1, 9.0]]), UNILATERAL)
+        scale_dense(np.array([[4.0, 1.0], [1.1, 9.0]]), UNILATERAL)
     with pytest.raises(InputError, match="NaN"):
-        scaled_dense(np.array([[4.0, np.nan], [np.nan, 9.0]]), UNILATERAL)
+        scale_dense(np.array([[4.0, np.nan], [np.nan, 9.0]]), UNILATERAL)
     with pytest.raises(InputError, match="as an array"):
-        scaled_dense(csr_matrix(G), UNILATERAL)  # type: ignore[arg-type]
+        scale_dense(csr_matrix(G), UNILATERAL)  # type: ignore[arg-type]
 
 
 def test_scales_do_not_depend_on_where_numbers_lie_in_memory():
@@ -97,13 +97,13 @@ def test_scales_do_not_depend_on_where_numbers_lie_in_memory():
     lies next to them: before it was mended, 2 % of these answers differed."""
     G = np.diag(10.0 ** np.random.default_rng(0).uniform(-2.0, 2.0, 9))
     bilateral = np.zeros(3, dtype=bool)
-    expected = energy_scale(G)
+    expected = compute_scale(G)
     # pairs of places, a matrix and its scales, one after the other in memory; every third is freed
     pairs = [(G.copy(), np.empty(9)) for _ in range(3000)]
     del pairs[::3]
     for _ in range(900):
         copy = G.copy()
-        scales = energy_scale(copy)
+        scales = compute_scale(copy)
         assert np.array_equal(scales, expected)
         pairs.append((copy, scales))
     bilateral = np.zeros(3, dtype=bool)

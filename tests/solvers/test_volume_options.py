@@ -22,7 +22,7 @@ from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.protocols import Frictionless
 from vi_contact.core.verify import kkt_residual
 from vi_contact.laws.friction import Coulomb
-from vi_contact.solvers.volume.failures import NOT_A_NUMBER, petsc_failure, reason_failure
+from vi_contact.solvers.volume.failures import NOT_A_NUMBER, make_petsc_failure, make_reason_failure
 from vi_contact.solvers.volume.route import (
     ReducedNewton,
     SemismoothNewton,
@@ -346,14 +346,16 @@ def test_reasons_of_every_petsc_have_words() -> None:
     new = type("New", (), {"DIVERGED_FUNCTION_NANORINF": NOT_A_NUMBER})
     for reasons in (old, new, PETSc.SNES.ConvergedReason):
         assert "(the residual is not a number): check the load" in str(
-            reason_failure("Volume", reasons, NOT_A_NUMBER, 1, 0.5)
+            make_reason_failure("Volume", reasons, NOT_A_NUMBER, 1, 0.5)
         )
     for words in (
         "Inf or NaN detected",
         "User provided compute function generated infinity or NaN",
     ):
-        assert "check the load" in str(petsc_failure("Volume", RuntimeError(words)))
-    assert "check that" in str(petsc_failure("Volume", RuntimeError("Nanometres are too long")))
+        assert "check the load" in str(make_petsc_failure("Volume", RuntimeError(words)))
+    assert "check that" in str(
+        make_petsc_failure("Volume", RuntimeError("Nanometres are too long"))
+    )
 
 
 @pytest.mark.serial
@@ -368,7 +370,7 @@ def test_the_objective_keeps_its_digits_near_its_origin() -> None:
     values = []
     for origin in (y, y + small):
         scaled.measure_from(origin)
-        values.append(scaled.objective(None, PETSc.Vec().createWithArray(y + small), gradient))
+        values.append(scaled.write_gradient(None, PETSc.Vec().createWithArray(y + small), gradient))
     change = small @ (scaled.residual(y) + 0.5 * (scaled.residual(y + small) - scaled.residual(y)))
     assert values[0] == pytest.approx(change, rel=1e-12) and values[1] == 0.0
 

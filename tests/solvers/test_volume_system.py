@@ -35,7 +35,7 @@ def dense(system: BoundedSystem) -> Any:
 def test_assembled_matrix_is_the_applied_one(options: dict[str, Any]) -> None:
     system = system_of(pushed_block(**options))
     A = dense(system)
-    assembled = system.assembled()
+    assembled = system.assemble()
     assert np.max(np.abs(A - A.T)) <= 1e-15 * np.max(np.abs(A))
     assert np.max(np.abs(assembled[:, :] - A)) <= 1e-15 * np.max(np.abs(A))
     assert np.max(np.sum(np.abs(A), axis=1)) <= system.norm()
@@ -46,7 +46,7 @@ def test_assembled_matrix_in_parallel(options: dict[str, Any]) -> None:
     """The renumbered rows and columns of all ranks multiply like the operator."""
     pytest.importorskip("mpi4py")
     system = system_of(pushed_block(parallel=True, **options))
-    assembled = system.assembled()
+    assembled = system.assemble()
     x, y = assembled.createVecs()
     x.array[:] = np.sin(1.0 + np.arange(system.size) + 10.0 * system.surface.comm.rank)
     assembled.mult(x, y)

@@ -361,7 +361,7 @@ def test_a_wall_time_ends_a_study(
 ) -> None:
     """Every run gets what is left; one that ends with status 75 leaves no row, and without time
     left none is begun."""
-    monkeypatch.setattr("vi_contact.run.wall_time.age", lambda: 100.0)
+    monkeypatch.setattr("vi_contact.run.wall_time.measure_age", lambda: 100.0)
     run = OneRun(
         read_case("wall.toml"),
         Shaking("motion_1", (Path("motion_1.at2"),)),

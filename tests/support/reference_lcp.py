@@ -15,7 +15,7 @@ from vi_contact.solvers.normal.lcp import (
     LCPResult,
     check_gap,
     check_operator,
-    energy_scale,
+    compute_scale,
 )
 
 
@@ -55,7 +55,7 @@ class LCP:
 
     @cached_property
     def _scale(self) -> Array:
-        return energy_scale(self.G)
+        return compute_scale(self.G)
 
 
 def _complementarity(r: Array, w: Array, bilateral: Mask) -> float:

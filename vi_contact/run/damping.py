@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from ..core.algebra import Array, Mask, total
+from ..core.algebra import Array, Mask, Matrix, total
 from ..core.checks import quote
 from ..core.problem import ContactProblem
 from ..core.state_checks import check_problem_given
+from ..core.surfaces import ContactSurface
 from ..core.system import SemiDiscreteSystem
 from ..laws.free_motions import free_motions
 from ..laws.materials import DampingRatio, NoDamping
@@ -23,7 +24,7 @@ from .modal import natural_modes
 
 TOUCHING = 1e-9  # of the size of the bodies: a gap that is none
 ALIKE = 1e-6  # of a frequency: modes that are closer are one motion in several directions
-KNOWN = "modes at the start"  # in the cache of a system
+CACHE = "modes at the start"  # the name of what ``_list_modes`` returns, in a system's cache
 NOT_COMPUTED = "not computed at its periods"
 
 
@@ -31,8 +32,10 @@ NOT_COMPUTED = "not computed at its periods"
 class FirstModes:
     """Hold the first natural modes with the contact closed where it touches at the start.
 
-    periods: T_k [s], the longest first; ratios: xi_k; rigid_motions: how many motions meet no
-    stiffness.
+    Attributes:
+        periods: T_k [s], the longest first.
+        ratios: damping ratios xi_k.
+        rigid_motions: how many motions meet no stiffness.
     """
 
     periods: tuple[float, ...]
@@ -40,37 +43,70 @@ class FirstModes:
     rigid_motions: int
 
 
+@dataclass(frozen=True)
+class _CachedModes:
+    """Hold the modes that were computed for a surface, and whether it had friction.
+
+    A system is shared by problems that differ in these two, on which the modes depend.
+    """
+
+    surface: ContactSurface
+    frictional: bool
+    modes: FirstModes
+
+    def are_of(self, problem: ContactProblem) -> bool:
+        """Say whether these are the modes of a problem on the same system."""
+        return self.surface is problem.surface and self.frictional == problem.frictional
+
+
 def first_modes(problem: ContactProblem) -> FirstModes:
     """Return the first three undamped natural modes of a problem, with the ratios that its C gives.
 
-    They are found once for a system and a surface. Collective.
+    They are computed once for a system, a surface, and contact with or without friction.
+    Collective.
     """
     check_problem_given("first_modes", problem)
-    surface, frictional = problem.surface, problem.frictional
-    known: list[tuple[Any, bool, FirstModes]] = problem.system.make_once(KNOWN, list)
-    for one, rubbing, modes in known:
-        if one is surface and rubbing == frictional:
-            return modes
-    known.append((surface, frictional, _found(problem)))
-    return known[-1][2]
+    modes = _recall_modes(problem)
+    if modes is None:
+        modes = _compute_modes(problem)
+        entry = _CachedModes(problem.surface, problem.frictional, modes)
+        _list_modes(problem.system).append(entry)
+    return modes
 
 
-def damping_in_words(problem: ContactProblem, *, unknown: str = "") -> str:
+def _list_modes(system: SemiDiscreteSystem) -> list[_CachedModes]:
+    """Return the list of modes computed so far, which the system holds."""
+    entries: list[_CachedModes] = system.make_once(CACHE, list)
+    return entries
+
+
+def _recall_modes(problem: ContactProblem) -> FirstModes | None:
+    """Return the modes of a problem if they have been computed before."""
+    for entry in _list_modes(problem.system):
+        if entry.are_of(problem):
+            return entry.modes
+    return None
+
+
+def describe_damping(problem: ContactProblem, *, unknown: str = "") -> str:
     """Return the damping of a problem as a text: "none", or its law and the ratios of its modes.
 
-    The ratios are told where ``first_modes`` have been found; ``unknown``: why they have not.
+    The ratios are told if ``first_modes`` has been called before: nothing is computed here.
+
+    Args:
+        problem: whose damping it is.
+        unknown: what stands in the place of ratios that have not been computed.
     """
-    system = problem.system
-    law = "; ".join(_sources(system))
+    law = "; ".join(_describe_sources(problem.system))
     if not law:
         return "none"
-    known: list[tuple[Any, bool, FirstModes]] = system.make_once(KNOWN, list)
-    for surface, rubbing, modes in known:
-        if surface is problem.surface and rubbing == problem.frictional:
-            pairs = enumerate(zip(modes.ratios, modes.periods, strict=True), start=1)
-            told = [f"{_per_cent(xi)} at T{number} = {T:.3g} s" for number, (xi, T) in pairs]
-            return f"{law}; {', '.join(told) or 'no natural mode was found'}"
-    return f"{law}; {unknown}" if unknown else law
+    modes = _recall_modes(problem)
+    if modes is None:
+        return f"{law}; {unknown}" if unknown else law
+    ratios = []
+    for number, (xi, T) in enumerate(zip(modes.ratios, modes.periods, strict=True), start=1):
+        ratios.append(f"{_in_per_cent(xi)} at T{number} = {T:.3g} s")
+    return f"{law}; {', '.join(ratios) or 'no natural mode was found'}"
 
 
 def first_open_period(problem: ContactProblem) -> float | None:
@@ -81,68 +117,89 @@ def first_open_period(problem: ContactProblem) -> float | None:
     A body that has lifted off may swing faster than with its contact closed. Collective.
     """
     surface = problem.surface
-    if not surface.some(_closed_at_start(problem) & ~surface.bilateral):
+    if not surface.some(_find_closed(problem) & ~surface.bilateral):
         return None
-    algebra, K, M, _, most = _matrices(problem, surface.bilateral)
-    frequencies, _, _ = natural_modes(algebra, K, M, rigid=most)
+    K, M, _ = _assemble_closed(problem, surface.bilateral)
+    algebra = problem.static_load.algebra
+    frequencies, _, _ = natural_modes(algebra, K, M, rigid=_count_rigid_motions(problem))
     return float(1.0 / frequencies[0]) if len(frequencies) else None
 
 
-def _closed_at_start(problem: ContactProblem) -> Mask:
+def _find_closed(problem: ContactProblem) -> Mask:
     """Return which conditions (m,) are held, or have no gap at the start."""
     surface = problem.surface
     size: float = getattr(problem.system.space, "size", 0.0)  # of the bodies [m]
     return np.asarray((surface.gap0 <= TOUCHING * size) | surface.bilateral)
 
 
-def _matrices(problem: ContactProblem, closed: Mask) -> tuple[Any, Any, Any, Mask, int]:
-    """Return (algebra, K, M, which unknowns are free, rigid motions at most).
+def _assemble_closed(problem: ContactProblem, closed: Mask) -> tuple[Matrix, Matrix, Mask]:
+    """Return K and M of the free unknowns, and which unknowns (n,) these are. Collective.
 
-    These are with the conditions (m,) closed.
+    The system is that of the nodal frames, without excitation. A closed condition on a rigid
+    support takes its unknown out, and with friction the tangential ones too (sticking); one on a
+    spring adds 1 / compliance to K_ii.
 
-    The system is that of the nodal frames, without excitation; closed conditions become supports or
-    springs.
+    Args:
+        problem: whose matrices they are.
+        closed: which conditions (m,) are closed.
     """
-    system, surface = problem.static_load, problem.surface
-    held, springs = np.zeros((2, system.rows))
-    rigid = closed & surface.rigid
-    held[surface.owned[rigid]] = 1.0
-    held[surface.tangents[(surface.tangents >= 0) & closed[:, None] & problem.frictional]] = 1.0
-    springs[surface.owned[closed & ~rigid]] = 1.0 / surface.compliance[closed & ~rigid]
-    algebra, every, free = system.algebra, np.arange(system.rows), held == 0.0
-    K = algebra.combine([(1.0, system.K), (1.0, algebra.local(every, every, springs, system.rows))])
-    K, M = (algebra.block(one, free) for one in (K, system.M))
-    most = sum(body.motions.shape[1] for body in free_motions(problem.system))
-    return algebra, K, M, free, most
-
-
-def _found(problem: ContactProblem) -> FirstModes:
     system = problem.static_load
-    algebra, K, M, free, most = _matrices(problem, _closed_at_start(problem))
+    surface = problem.surface
+    algebra = system.algebra
+    rigid = closed & surface.rigid
+    soft = closed & ~surface.rigid
+
+    free = np.ones(system.rows, dtype=bool)
+    free[surface.owned[rigid]] = False
+    if problem.frictional:
+        has_unknown = surface.tangents >= 0  # else the component is prescribed
+        free[surface.tangents[has_unknown & closed[:, None]]] = False
+
+    springs = np.zeros(system.rows)
+    springs[surface.owned[soft]] = 1.0 / surface.compliance[soft]
+    rows = np.arange(system.rows)
+    on_springs = algebra.local(rows, rows, springs, system.rows)
+    K = algebra.block(algebra.combine([(1.0, system.K), (1.0, on_springs)]), free)
+    M = algebra.block(system.M, free)
+    return K, M, free
+
+
+def _count_rigid_motions(problem: ContactProblem) -> int:
+    """Return how many rigid motions all bodies have at most, when no contact holds them."""
+    return sum(body.motions.shape[1] for body in free_motions(problem.system))
+
+
+def _compute_modes(problem: ContactProblem) -> FirstModes:
+    """Return the first modes of a problem; see ``first_modes``. Collective."""
+    system = problem.static_load
+    algebra = system.algebra
+    K, M, free = _assemble_closed(problem, _find_closed(problem))
+    most = _count_rigid_motions(problem)
     frequencies, modes, rigid_motions = natural_modes(algebra, K, M, rigid=most)
-    # The share of each mode in C: phiᵀ C phi / (2 w phiᵀ M phi).
+
+    # The share of each mode in C: xi = phiᵀ C phi / (2 w phiᵀ M phi).
     ratios = np.zeros(len(frequencies))
     if system.C is not None:
-        C, w = algebra.block(system.C, free), 2.0 * np.pi * frequencies
-        columns = [np.ascontiguousarray(one) for one in modes.T]
-        damped, moving = (
-            np.array([total(algebra.comm, one @ (A @ one)) for one in columns]) for A in (C, M)
-        )
-        ratios = _of_alike(frequencies, damped / (2.0 * w * moving))
+        C = algebra.block(system.C, free)
+        columns = [np.ascontiguousarray(mode) for mode in modes.T]
+        damped = np.array([total(algebra.comm, phi @ (C @ phi)) for phi in columns])
+        moving = np.array([total(algebra.comm, phi @ (M @ phi)) for phi in columns])
+        w = 2.0 * np.pi * frequencies
+        ratios = _average_alike(frequencies, damped / (2.0 * w * moving))
     return FirstModes(tuple((1.0 / frequencies).tolist()), tuple(ratios.tolist()), rigid_motions)
 
 
-def _of_alike(frequencies: Array, ratios: Array) -> Array:
-    """Return the ratios with their mean over modes of one frequency.
+def _average_alike(frequencies: Array, ratios: Array) -> Array:
+    """Return the ratios (k,), each the mean over all modes of its frequency.
 
-    Of these none is more a mode than another, so that the answer does not depend on the basis that
-    the solver found.
+    Modes of one frequency are any basis of a space, and the mean does not depend on which of them
+    the eigensolver returned.
     """
     close = np.abs(frequencies[:, None] - frequencies) <= ALIKE * frequencies[:, None]
     return np.asarray((close @ ratios) / close.sum(axis=1))
 
 
-def _sources(system: SemiDiscreteSystem) -> Iterator[str]:
+def _describe_sources(system: SemiDiscreteSystem) -> Iterator[str]:
     """Yield what damps a system, in words."""
     if system.C is None:
         return
@@ -151,30 +208,36 @@ def _sources(system: SemiDiscreteSystem) -> Iterator[str]:
         yield "a matrix C of its own"
         return
     if isinstance(forms.damping, DampingRatio):
-        yield f"{_ratios(forms)} at {_frequencies(forms.damping)}"
+        yield f"{_describe_ratios(forms)} at {_describe_frequencies(forms.damping)}"
     elif not isinstance(forms.damping, NoDamping):
         yield quote(forms.damping)
     if forms.own_damping:
         yield "a damping form of its own"
-    boundaries = [f"{type(one).__name__} on '{one.facets.name}'" for one in forms.boundaries]
+    boundaries = []
+    for boundary in forms.boundaries:
+        boundaries.append(f"{type(boundary).__name__} on '{boundary.facets.name}'")
     if boundaries:
         yield ", ".join(boundaries)
 
 
-def _ratios(forms: Any) -> str:
+def _describe_ratios(forms: Any) -> str:
     """Return the damping ratios of the materials: one, or from the least to the largest."""
-    given = [one.xi for _, one in forms.materials]
-    if any(callable(one) for one in given):
-        return f"up to {_per_cent(forms.largest_ratio)}"
-    least = min(given)
-    if least == max(given):
-        return _per_cent(least)
-    return f"{100.0 * least:.3g} to {_per_cent(max(given))}"
+    ratios = [material.xi for _, material in forms.materials]
+    if any(callable(xi) for xi in ratios):  # a function of the place
+        return f"up to {_in_per_cent(forms.largest_ratio)}"
+    least = min(ratios)
+    largest = max(ratios)
+    if least == largest:
+        return _in_per_cent(least)
+    return f"{100.0 * least:.3g} to {_in_per_cent(largest)}"
 
 
-def _frequencies(law: DampingRatio) -> str:
-    return f"f1 = {law.frequency:.4g} Hz" + (f" and f2 = {law.second:.4g} Hz" if law.second else "")
+def _describe_frequencies(law: DampingRatio) -> str:
+    """Return the frequencies at which a law has the damping ratios of the materials."""
+    first = f"f1 = {law.frequency:.4g} Hz"
+    return f"{first} and f2 = {law.second:.4g} Hz" if law.second else first
 
 
-def _per_cent(ratio: float) -> str:
+def _in_per_cent(ratio: float) -> str:
+    """Return a ratio in per cent, with three digits."""
     return f"{100.0 * ratio:.3g} %"

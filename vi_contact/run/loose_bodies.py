@@ -48,14 +48,14 @@ def find_loose_bodies(problem: ContactProblem) -> list[LooseBody]:
     # Nearly every body is touched: the rest, which gathers nodes, is for those that are not.
     system = problem.system
     rows = rows_of_bodies(system)
-    touched = _touched_by_contact(problem, rows)
+    touched = _find_touched(problem, rows)
     if touched.all():
         return []
     from scipy.spatial import cKDTree  # late: no other run needs it
 
     comm = system.algebra.comm
     points = system.space.coordinates
-    nodes = [_distinct(from_each(comm, points[own])) for own in rows]
+    nodes = [_merge(from_each(comm, points[own])) for own in rows]
     size = float(np.max(np.ptp(np.concatenate(nodes), axis=0), initial=0.0))
     loose = []
     for number, free in enumerate(free_motions(system)):
@@ -71,12 +71,12 @@ def find_loose_bodies(problem: ContactProblem) -> list[LooseBody]:
     return loose
 
 
-def _distinct(parts: list[Array]) -> Array:
+def _merge(parts: list[Array]) -> Array:
     """Return the places of all ranks, each once."""
     return np.asarray(np.unique(np.concatenate(parts), axis=0))
 
 
-def _touched_by_contact(problem: ContactProblem, bodies: list[Indices]) -> Mask:
+def _find_touched(problem: ContactProblem, bodies: list[Indices]) -> Mask:
     """Return for every body whether it is on a side of some contact condition. Collective.
 
     A translation of such a body alone moves the condition.
@@ -102,19 +102,19 @@ def judge_loose_bodies(problem: ContactProblem) -> Iterator[tuple[str, bool]]:
     It is refused where its nodes lie at another's.
     """
     for body in find_loose_bodies(problem):
-        what = (
-            f"nothing holds the body of {body.nodes} nodes around {describe_point(body.middle)}, "
-            "and no contact touches it"
+        sentence = (
+            f"nothing holds the body of {body.nodes} nodes around {describe_point(body.middle)}, and no "
+            "contact touches it"
         )
         if body.coinciding:
             yield (
-                f"{what}: {body.coinciding} of its nodes lie at the places of nodes of another "
+                f"{sentence}: {body.coinciding} of its nodes lie at the places of nodes of another "
                 "body, as of meshes that are not merged: merge them (Coherence in Gmsh), or make a "
                 "contact or a tie between the two",
                 True,
             )
         else:
-            yield f"{what}: it moves freely", False
+            yield f"{sentence}: it moves freely", False
 
 
 def refuse_loose_bodies(problem: ContactProblem) -> None:

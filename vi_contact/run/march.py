@@ -1,4 +1,13 @@
-"""March: the one time loop, a generator over certified steps."""
+"""March: the one time loop, a generator over certified steps.
+
+A *base step* is one of the plan (``time_steps``). ``HalvedAtImpact`` may make it in halves, which
+are certified steps like any other. Every step is made in the order that ``core.step`` states:
+
+    scheme.step -> solver.solve with its certificate -> scheme.finish -> impact law -> scheme.jump
+
+Whatever a user's own function raises on one rank within ``with together(comm)`` is raised on all
+ranks at its end.
+"""
 
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -14,7 +23,7 @@ from ..core.state_checks import initial_state
 from ..core.step import Report, Scheme, Solver, State
 from ..solvers.certified import TOLERANCE, CertifiedSolver
 from .method import Method, choose_method
-from .time_steps import StepPlan, TimeSteps, step_plan
+from .time_steps import StepPlan, TimeSteps, plan_steps
 
 
 def march(
@@ -62,19 +71,21 @@ def march(
     )
     with together(method.problem.surface.comm):
         state = initial_state(method.problem) if state is None else state
-    return iter(March(method, step_plan(dt, steps, t_end, state.t), state))
+    return iter(March(method, plan_steps(dt, steps, t_end, state.t), state))
 
 
 class March:
     """Step along a plan, and keep the books of it.
 
     Attributes, at the time a step is handed out:
+        method: scheme, solvers and tolerance.
+        step_plan: all base steps of the run.
         state: at its end.
         base: base steps done.
         ended: whether this step ended one, so that a restart may begin here.
-        dt: the length of this step [s].
+        dt: the length of this step [s]; nan before the first.
         halved: attempts that were thrown away.
-        prepared: matrices and solvers by the length of their steps.
+        prepared: length of a step [s] -> its effective matrix and solver, one factor each.
     """
 
     def __init__(
@@ -105,12 +116,15 @@ class March:
             dt = self.step_plan.dt(self.base)
             self.method.bind()  # another run of the problem may be under way
             if not sizes or sizes[0] != dt:
-                # A new piece of the plan: matrices of other sizes may be let go.
+                # A new piece of the plan, with the sizes of its halves by level: dt, dt/2, dt/4, …
+                # Factors of other sizes may be let go.
                 sizes = [dt / 2**level for level in range(self.step_plan.halvings + 1)]
                 self.prepared = {
                     size: self.prepared[size] for size in sizes if size in self.prepared
                 }
-            self.state = self._state_for(dt)
+
+            # The scheme's memory of earlier steps is for steps of one length.
+            self.state = self._convert_state(dt)
             self.dt = dt
 
             # The parts of the base step that are left, last first: how often each was halved. A
@@ -130,7 +144,7 @@ class March:
                     self.base += 1
                 yield report.new, report
 
-    def _state_for(self, dt: float) -> State:
+    def _convert_state(self, dt: float) -> State:
         """Return the state, with the scheme's memory of a past in steps of dt [s]."""
         if dt == self.dt:
             return self.state
@@ -141,10 +155,12 @@ class March:
     def _attempt(self, dt: float, *, final: bool) -> Report | None:
         """Return a step of dt [s]; None when it closes a point and is to be halved.
 
-        Nothing has happened then. A ``final`` step is not halved any more.
+        The march is then as it was before. Loads, motions and laws are the user's, and may fail on
+        one rank: all ranks are asked once, at its end.
 
-        Its loads, motions and laws are the user's, and may fail on one rank: all ranks are asked
-        once, at its end.
+        Args:
+            dt: the length of the step [s].
+            final: whether it is accepted in any case, as the plan allows no more halves.
         """
         with together(self.method.problem.surface.comm):
             return self._make_step(dt, final=final)
@@ -153,7 +169,7 @@ class March:
         """Do the work of ``_attempt``, in its frame of all ranks."""
         problem = self.method.problem
         scheme = self.method.scheme
-        state = self._state_for(dt)
+        state = self._convert_state(dt)
 
         # The scheme reduces the step to one inequality, A x = b with contact.
         A, solver = self.prepared.get(dt, (None, None))
@@ -166,7 +182,8 @@ class March:
             solver = CertifiedSolver(problem, A, step.scale, method.solvers, method.tolerance)
             self.prepared[dt] = (A, solver)
 
-        # It is solved with a certificate, and thrown away if it is too long for an impact.
+        # It is solved with a certificate, and thrown away if it is too long for an impact, which is
+        # where a point closes that was open before.
         if problem.surface.watched:
             problem.surface.refuse_driven(step.t)
         result, certificate, escalated = solver.solve(step)
@@ -179,17 +196,32 @@ class March:
         with together_if_own(problem.surface.comm, problem.impact or scheme):
             new = after_impact(problem, scheme, state, free, dt)
         for vector in (free.u, free.v, new.u, new.v):
-            freeze(vector)  # what is known of them stays true
+            freeze(vector)  # products with them are remembered, and have to stay true
+
+        # Forces of the step's balance are formed only if some recorder asks for them.
         averages = partial(scheme.balance, problem, state, free, dt)
-        return Report(problem, state, new, free.v, step, result, certificate, averages, escalated)
+        return Report(
+            problem=problem,
+            old=state,
+            new=new,
+            v_minus=free.v,
+            step=step,
+            result=result,
+            certificate=certificate,
+            averages=averages,
+            escalated=escalated,
+        )
 
 
 def after_impact(
     problem: ContactProblem, scheme: Scheme, old: State, new: State, dt: float
 ) -> State:
-    """Return the state with the impact law applied.
+    """Return the state with the impact law applied: its velocities, after the step.
 
-    Points on massless supports (springs) do not collide.
+    The law says which normal velocities closed points have after an impact, from those before the
+    step; nan leaves a point alone. ``law.apply`` finds the velocities v of all unknowns with these,
+    by an impulse at the points, and the scheme writes the jump into its state. Points on massless
+    supports (springs) do not collide.
 
     Args:
         problem: whose law it is.

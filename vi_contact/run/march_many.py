@@ -13,7 +13,7 @@ from ..core.state_checks import initial_state
 from ..core.step import Report, Scheme, Solver, State
 from ..solvers.certified import TOLERANCE
 from .method import choose_method, with_defaults
-from .time_steps import TimeSteps, step_plan
+from .time_steps import TimeSteps, plan_steps
 from .together import Together, group_runs
 
 
@@ -58,9 +58,9 @@ def march_many(
         InputError: at the call, as of ``march``, and where there is not one value for each run.
     """
     checked = several("march_many", "problems", problems, "give a list of ContactProblems")
-    steps_of_runs = _one_for_each("steps", steps, len(checked))
-    ends = _one_for_each("t_end", t_end, len(checked))
-    starts = _one_for_each("states", states, len(checked))
+    steps_of_runs = _spread("steps", steps, len(checked))
+    ends = _spread("t_end", t_end, len(checked))
+    starts = _spread("states", states, len(checked))
     runs: list[Together] = []
     for problem, count, end, state in zip(checked, steps_of_runs, ends, starts, strict=True):
         problem, scheme = with_defaults(problem, scheme, [run.method.problem for run in runs])
@@ -77,13 +77,13 @@ def march_many(
         )
         if state is None:
             state = initial_state(method.problem)
-        plan = step_plan(dt, count, end, state.t)
+        plan = plan_steps(dt, count, end, state.t)
         runs.append(Together(method, plan, scheme.start(method.problem, state, plan.dt(0))))
     group_runs(runs)
-    return _in_turn(runs)
+    return _march_in_turn(runs)
 
 
-def _one_for_each(name: str, value: Any, count: int) -> Sequence[Any]:
+def _spread(name: str, value: Any, count: int) -> Sequence[Any]:
     """Return one value for each run.
 
     Args:
@@ -100,7 +100,7 @@ def _one_for_each(name: str, value: Any, count: int) -> Sequence[Any]:
     return value
 
 
-def _in_turn(runs: Sequence[Together]) -> Iterator[tuple[int, Report | ViContactError]]:
+def _march_in_turn(runs: Sequence[Together]) -> Iterator[tuple[int, Report | ViContactError]]:
     """Yield a step of every run in turn, until all have ended."""
     going = {number: run.reports() for number, run in enumerate(runs)}
     while going:

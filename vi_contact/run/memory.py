@@ -11,7 +11,7 @@ from ..core.algebra import EffectiveMatrix, from_each, total
 from ..core.problem import ContactProblem
 
 
-def memory(problem: ContactProblem, A: EffectiveMatrix | None) -> dict[str, Any]:
+def measure_memory(problem: ContactProblem, A: EffectiveMatrix | None) -> dict[str, Any]:
     """Return peak_bytes, the largest resident memory of every rank so far, and bytes. Collective.
 
     The bytes are, by name and of all ranks together, those of what says how many it has: the
@@ -27,21 +27,21 @@ def memory(problem: ContactProblem, A: EffectiveMatrix | None) -> dict[str, Any]
         "factor": [A.factor if A is not None and A.factorised else None],
         "mesh": [problem.system.space],
     }
-    known: dict[str, int] = {}
+    sizes: dict[str, int] = {}
     for name, things in owners.items():
         distinct = {id(thing): thing for thing in things}  # bases may share a matrix
         size = total(comm, sum(getattr(thing, "bytes", 0) for thing in distinct.values()))
         if size:
-            known[name] = round(size)
+            sizes[name] = round(size)
     peak = 1024 * getrusage(RUSAGE_SELF).ru_maxrss
-    return {"peak_bytes": from_each(comm, peak), "bytes": known}
+    return {"peak_bytes": from_each(comm, peak), "bytes": sizes}
 
 
-def in_words(memory: Mapping[str, Any]) -> str:
-    """Return the same in a line, in megabytes."""
+def describe_memory(memory: Mapping[str, Any]) -> str:
+    """Return what ``measure_memory`` has returned in a line, in megabytes."""
     peaks = memory["peak_bytes"]
-    known = "".join(f"; {name} {1e-6 * size:.3g}" for name, size in memory["bytes"].items())
+    sizes = "".join(f"; {name} {1e-6 * size:.3g}" for name, size in memory["bytes"].items())
     return (
         f"memory [MB]: at most {1e-6 * max(peaks):.4g} on a rank, {1e-6 * sum(peaks):.4g} on "
-        f"all{known}"
+        f"all{sizes}"
     )

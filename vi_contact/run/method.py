@@ -1,6 +1,7 @@
-"""Choose and check how a problem is marched.
+"""Choose and check how a problem is marched: scheme, solvers, tolerance, time steps, first state.
 
-This is scheme, solvers, tolerance, time steps, and the state it starts from.
+``choose_method`` serves every function that marches (march, simulate, march_many, …): it names the
+function in its sentences, and fills in what is not said.
 """
 
 from collections.abc import Sequence
@@ -21,7 +22,7 @@ from ..schemes.trapezoidal import Trapezoidal
 from ..schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from ..solvers.automatic import Automatic
 from .loose_bodies import refuse_loose_bodies
-from .time_steps import TimeSteps, step_plan
+from .time_steps import TimeSteps, plan_steps
 
 SCHEME = ("check", "start", "jump", "effective_matrix", "step", "finish", "balance")
 SLACK = 10.0  # of the tolerance, and of the largest displacement: what a state may penetrate
@@ -78,15 +79,17 @@ def choose_method(
         InputError: arguments of the wrong kind, or a state of another problem or inside the
             obstacle.
     """
+    # All ranks were given the same, and of the right kinds.
     check_problem_given(owner, problem)
     comm = problem.surface.comm
+    first, escalation = solvers
     agree(
         comm,
         owner,
         {
             "scheme": scheme,
-            "solver": solvers[0],
-            "escalation": solvers[1],
+            "solver": first,
+            "escalation": escalation,
             "dt": dt,
             "steps": steps,
             "t_end": t_end,
@@ -94,13 +97,16 @@ def choose_method(
             "tolerance": tolerance,
         },
     )
-    check_methods(owner, *solvers, tolerance)
+    check_methods(owner, first, escalation, tolerance)
+
+    # Defaults of what is not said.
     problem, scheme = with_defaults(problem, scheme)
-    first, escalation = solvers
     if first is None:
         first = Automatic()
     method = Method(problem, scheme, [first, *escalation], dt, tolerance)
-    size = step_plan(dt, steps, t_end, read_start_time(owner, state)).dt(0)
+
+    # Scheme, solver and state suit the problem.
+    size = plan_steps(dt, steps, t_end, read_start_time(owner, state)).dt(0)
     with together(comm):  # what is the user's own may fail on one rank
         method.bind()
         problem.equations.forget_loads()
@@ -108,7 +114,8 @@ def choose_method(
         method.solvers[0].check(problem)
         if state is not None:
             check_state(owner, problem, state, dt=size, tolerance=tolerance, scheme=scheme)
-    # what continues a run was looked at when it began
+
+    # What continues a run was looked at when it began.
     if problem.system.floating and state is None:
         refuse_loose_bodies(problem)
     return method
@@ -152,7 +159,10 @@ def with_defaults(
 def check_solver(owner: str, value: Any, meaning: str = "solver") -> None:
     """Raise InputError unless ``value`` is a solver of steps.
 
-    ``owner`` and ``meaning`` say in the sentence whose argument it is, and which.
+    Args:
+        owner: the function or class whose argument it is, for the sentence.
+        value: what the user gave.
+        meaning: what it should be, for the sentence.
     """
     provides(
         owner,

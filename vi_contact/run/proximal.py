@@ -10,9 +10,9 @@ of u_k (``correction``):
 
 each step of which is an ordinary problem of the contract, with one factorisation for all. P is the
 mass of every body on springs to where it is, as weak as the body's own stiffness allows
-(``rigid_bodies.body_springs``). It converges from any start if there is an equilibrium. If there is
-none, d tends to a rigid motion that no contact stops and that the loads drive; that is how it is
-recognised (K d = 0, B_n d <= 0, f·d > 0: the energy has no minimum).
+(``rigid_bodies.make_body_springs``). It converges from any start if there is an equilibrium. If
+there is none, d tends to a rigid motion that no contact stops and that the loads drive; that is how
+it is recognised (K d = 0, B_n d <= 0, f·d > 0: the energy has no minimum).
 
 Rigid motions that no load drives stay where they start: along them P-weighted means of u are those
 of u0 (the centre of mass of a block free to slide on level ground does not move). On a conservative
@@ -29,8 +29,8 @@ from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
 from ..core.step import Solver, StepProblem, StepResult
 from ..core.verify import kkt_residual
-from ..solvers.correction import MARGIN, add, kept_reactions, left_over, share_of
-from .rigid_bodies import RigidBodies, body_springs
+from ..solvers.correction import MARGIN, add, choose_share, keep_reactions, pose_remainder
+from .rigid_bodies import RigidBodies, make_body_springs
 
 ITERATIONS = 200
 STIFFER = 1e3  # springs for solvers that the weak ones defeat
@@ -128,7 +128,7 @@ class Proximal:
         self._K = K
         self._solver = solver
         self._bodies = RigidBodies(problem)
-        self._weak = body_springs(problem)
+        self._weak = make_body_springs(problem)
         self._tolerance = tolerance
         self._stiffen(1.0)
 
@@ -190,11 +190,11 @@ class Proximal:
         old: _Motion | None = None
         for _ in range(ITERATIONS):
             # One step: an ordinary problem for what the answer leaves over.
-            inner = self._left_over(answer, share, centre, carried)
+            inner = self._pose_next(answer, share, centre, carried)
             increment = self._prepared.solve(inner)
             result = add(self.step, answer, increment, share)
             worst = self.certificate(result).worst
-            new = self._motion(result.x - centre, increment.active)
+            new = self._measure_motion(result.x - centre, increment.active)
             progress.take(result, worst, new.pace)
             if progress.certified and progress.vain == 2:
                 return
@@ -207,24 +207,24 @@ class Proximal:
             # not help.
             last = share
             helped = again or last == 1.0 or worst < 0.5 * before
-            share = share_of(worst) if helped else min(1.0, MARGIN * last)
+            share = choose_share(worst) if helped else min(1.0, MARGIN * last)
             again = share < last == 1.0
             before = worst
             answer = result
             if again:
                 continue  # the same step, which corrects its round-off
-            carried = self._missing(inner, increment)
+            carried = self._find_missing(inner, increment)
 
             # Steps that are parallel are summed up at once. Once the tolerance is met they are
             # round-off: to go far along one would shift the body.
             ahead = 0.0
             if old is not None and not progress.certified:
-                ahead = self._ahead(old, new, result)
+                ahead = self._look_ahead(old, new, result)
             old = new if ahead == 0.0 else None
             answer = replace(result, x=result.x + ahead * new.d)
             centre = answer.x
 
-    def _missing(self, inner: StepProblem, increment: StepResult) -> Array:
+    def _find_missing(self, inner: StepProblem, increment: StepResult) -> Array:
         """Return what a solver left of a step's resultants (n,) [N].
 
         The next step carries it, or bodies would drift along what P holds.
@@ -235,7 +235,7 @@ class Proximal:
         reaction = inner.surface.reaction_load(increment.r_n, len(x), increment.r_t)
         return self._bodies.resultants(inner.b - self._springs @ x - reaction)
 
-    def _left_over(
+    def _pose_next(
         self, answer: StepResult, share: float, centre: Array, carried: Array
     ) -> StepProblem:
         """Return the next step, b with the forces' own resultants.
@@ -248,10 +248,10 @@ class Proximal:
             centre: from where the springs pull (n,) [m].
             carried: resultants that the step before left (n,) [N].
         """
-        left = left_over(self.step, answer, share)
+        left = pose_remainder(self.step, answer, share)
         x = answer.x
         surface = self.step.surface
-        r_n, r_t = kept_reactions(self.step, answer, share)
+        r_n, r_t = keep_reactions(self.step, answer, share)
         forces = self.step.b - surface.reaction_load(r_n, len(x), r_t)
         b = (
             left.b
@@ -261,13 +261,13 @@ class Proximal:
         )
         return replace(left, A=self._A, b=b)
 
-    def _motion(self, d: Array, active: Mask) -> _Motion:
+    def _measure_motion(self, d: Array, active: Mask) -> _Motion:
         """Return the step d (n,) [m] that ended with this contact set (m,). Collective."""
         pull = self._springs @ d
         pace = float(np.sqrt(max(self._system.algebra.dot(d, pull), 0.0)))
         return _Motion(d, pull, pace, self.step.surface.normal_values(d), active)
 
-    def _closes(self, motion: _Motion) -> Mask:
+    def _find_closing(self, motion: _Motion) -> Mask:
         """Return the contact points (m,) that come nearer to their obstacle. Collective."""
         size = largest(self.step.surface.comm, max_abs(motion.d))
         return np.asarray((motion.closing > STOPPED * size) & np.isfinite(self.step.bound))
@@ -281,16 +281,18 @@ class Proximal:
         energy = motion.pace**2
         bending = 2.0 * system.strain_energy(motion.d)
         work = system.algebra.dot(self.step.b, motion.d)
-        stopped = self.step.surface.some(self._closes(motion))
+        stopped = self.step.surface.some(self._find_closing(motion))
+        # It does not move, it deforms the body, no load drives it, or a contact stops it.
         if energy == 0.0 or bending > RIGID * energy or work < DRIVEN * energy or stopped:
             return
+        way = self._describe_way(motion.d)
         raise InputError(
-            f"the body has no static equilibrium: its loads {self._way(motion.d)} and neither "
-            "contact nor a prescribed displacement stops it: hold it there, change the loads, or "
-            "start the dynamics from rest"
+            f"the body has no static equilibrium: its loads {way} and neither contact nor a "
+            "prescribed displacement stops it: hold it there, change the loads, or start the "
+            "dynamics from rest"
         )
 
-    def _way(self, d: Array) -> str:
+    def _describe_way(self, d: Array) -> str:
         """Return in words where a motion d (n,) goes: along its momentum, if it has one."""
         momentum = self._system.M @ d
         sums = np.column_stack([self._system.influence * momentum[:, None], np.abs(momentum)])
@@ -301,7 +303,7 @@ class Proximal:
         way = ", ".join(f"{x / largest if abs(x) > 1e-4 * largest else 0.0:.2g}" for x in push)
         return f"carry it off along ({way})"
 
-    def _ahead(self, old: _Motion, new: _Motion, result: StepResult) -> float:
+    def _look_ahead(self, old: _Motion, new: _Motion, result: StepResult) -> float:
         """Return how many times d to go further at once.
 
         It is the sum of the steps to come when each is ‖d_new‖/‖d_old‖ of the one before (Aitken),
@@ -319,7 +321,7 @@ class Proximal:
             return 0.0
 
         # As far as the next contact: the least gap over its closing, of all ranks.
-        rows = self._closes(new) & ~result.active
+        rows = self._find_closing(new) & ~result.active
         gap = (self.step.bound - surface.normal_values(result.x))[rows]
         nearest = np.max(-np.maximum(gap, 0.0) / new.closing[rows], initial=-np.inf)
         stop = -largest(surface.comm, nearest)

@@ -1,4 +1,10 @@
-"""Hold and check what is asked of one run, before anything is computed or overwritten."""
+"""Hold and check what is asked of one run, before anything is computed or overwritten.
+
+Three checks stand one after another: here, of arguments by themselves (kinds, numbers, and what
+needs an output folder); in ``method.choose_method``, of the problem with its scheme and solver; in
+``simulate.open_run``, of the folder and of what a checkpoint in it is of. The checks of
+``core.checks`` take (whose argument it is, its name, its value, …), and raise one sentence.
+"""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
@@ -18,7 +24,7 @@ from .files.writer import FieldWriter
 from .time_steps import TimeSteps
 
 OWNER = "simulate"  # whose arguments the sentences of errors speak of
-RECORDER = ("columns", "start", "row")
+RECORDER = ("columns", "start", "row")  # methods that a recorder has: ``core.step.Recorder``
 
 
 class CrossCheck(Protocol):
@@ -67,16 +73,15 @@ class RunRequest:
         What depends on the problem is looked at by ``method.choose_method``. Collective.
         """
         check_problem_given(OWNER, self.problem)
+
+        # First that all ranks were given the same: what follows then fails on all of them alike.
         agree(self.comm, OWNER, self._values_to_compare())
         self._check_outputs()
         self._check_fields_and_cross_check()
-        optional(
-            function,
-            OWNER,
-            "callback",
-            self.callback,
-            "give a function of a state and a report, or None",
-        )
+        remedy = "give a function of a state and a report, or None"
+        optional(function, OWNER, "callback", self.callback, remedy)
+
+        # Arguments that make no sense without another one.
         if self.wall_time is not None and self.out is None:
             raise InputError("wall_time needs a folder from which the run continues: give out")
         if self.changed and self.restart is False:
@@ -88,12 +93,14 @@ class RunRequest:
     def _values_to_compare(self) -> dict[str, Any]:
         """Return what has to be the same on all ranks: name -> value.
 
-        Every rank has its part of the problem, and only rank 0 shows progress.
+        The problem is left out, of which every rank has its part, and progress, which rank 0 alone
+        shows. ``Parts`` leaves out the arrays of a state, of which every rank has its part too.
         """
         values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        del values["problem"], values["progress"]
-        values["record"] = _kinds_of(self.record)
-        values["out"] = None if self.out is None else str(self.out)
+        del values["problem"]
+        del values["progress"]
+        values["record"] = _describe_recorders(self.record)
+        values["out"] = None if self.out is None else str(self.out)  # a path or its text
         values["state"] = Parts(self.state)
         return values
 
@@ -123,15 +130,18 @@ class RunRequest:
             provides(OWNER, "cross_check", self.cross_check, ("report",), remedy)
 
 
-def _kinds_of(record: Any) -> Any:
+def _describe_recorders(record: Any) -> Any:
     """Return what of the recorders is compared over ranks.
 
     This is their kinds, and the settings of those of the package: each rank may hold its part of
-    what is recorded.
+    what is recorded. Of a recorder of the user's nobody knows which attributes are settings. What
+    is no list of recorders is compared as it is, and refused later.
     """
     if not isinstance(record, list | tuple):
         return record
-    return [
-        Parts(recorder) if type(recorder).__module__.startswith("vi_contact.") else type(recorder)
-        for recorder in record
-    ]
+    descriptions: list[Any] = []
+    for recorder in record:
+        kind = type(recorder)
+        is_own = kind.__module__.startswith("vi_contact.")
+        descriptions.append(Parts(recorder) if is_own else kind)
+    return descriptions

@@ -13,7 +13,7 @@ from ..core.algebra import Array, Matrix, total
 from ..core.problem import ContactProblem
 from ..laws.free_motions import count_bodies, free_motions
 
-WEAK = 4e-6  # of a stiffness: see body_springs
+WEAK = 4e-6  # of a stiffness: see make_body_springs
 STRONG = 1e-4  # the same
 
 
@@ -62,7 +62,7 @@ class RigidBodies:
         return 2.0 * force - self._coupling.transpose_apply(force)
 
 
-def body_springs(problem: ContactProblem) -> Matrix:
+def make_body_springs(problem: ContactProblem) -> Matrix:
     """Return P, the springs of bodies. Collective.
 
     P is the mass matrix of every body, times a number [1/s²] that makes the sum of its entries

@@ -1,10 +1,10 @@
-"""Hold what several runs have in one step as rows.
+"""Hold what several runs have in one step as rows: arrays (k, n) and (k, m) of k runs.
 
-That of one run is made when somebody asks for it.
-
-A step of a small system costs as much as the objects that tell of it: those that nobody reads are
-not made. What was made stays as it is, whatever the runs do later: every step has arrays of its
-own, and nobody writes to them.
+The numerics of ``together`` works on these rows. The objects of one run (its state, its step, its
+report) are made when somebody asks for them, as views of the rows: a step of a small system costs
+as much as the objects that tell of it, and those that nobody reads are not made. What was made
+stays as it is, whatever the runs do later: every step has arrays of its own, and nobody writes to
+them.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -20,8 +20,8 @@ from ..core.step import Report, State, StepProblem
 from ..core.system import Load, evaluate_history
 
 
-class Each(dict[int, Any]):
-    """Hold something of every run by its row, made when somebody asks for it."""
+class LazyRows(dict[int, Any]):
+    """Hold something of every run by its row, made when somebody asks for it, and then kept."""
 
     def __init__(self, make: Callable[[int], Any]) -> None:
         self._make = make
@@ -33,7 +33,11 @@ class Each(dict[int, Any]):
 
 
 class RowReport(Report):
-    """Report the step of one run; ``parts`` have those of every run, by the names of a report's."""
+    """Report the step of one run, whose parts are made when they are read.
+
+    It is made of ``row``, the row of the run, and of ``parts``: name of a part of a report -> what
+    has it by the row of every run.
+    """
 
     def __init__(self, **values: Any) -> None:
         self.__dict__.update(values)
@@ -67,18 +71,20 @@ def join_states(states: Sequence[State]) -> State:
         zero = 0.0 * rubbing[0]
         r_t = np.stack([zero if state.r_t is None else state.r_t for state in states])
     return State(
-        first.t,
-        first.k,
-        freeze(np.stack([state.u for state in states])),
-        freeze(np.stack([state.v for state in states])),
-        np.stack([state.r_n for state in states]),
-        np.stack([state.active for state in states]),
-        memory,
-        r_t,
+        t=first.t,
+        k=first.k,
+        u=freeze(np.stack([state.u for state in states])),
+        v=freeze(np.stack([state.v for state in states])),
+        r_n=np.stack([state.r_n for state in states]),
+        active=np.stack([state.active for state in states]),
+        memory=memory,
+        r_t=r_t,
     )
 
 
-def own_states(problem: ContactProblem, problems: Sequence[ContactProblem], many: State) -> Each:
+def split_states(
+    problem: ContactProblem, problems: Sequence[ContactProblem], many: State
+) -> LazyRows:
     """Return the states of the runs, each made when somebody asks for it.
 
     Their problems get to know the products of the rows with M, K and C.
@@ -89,7 +95,8 @@ def own_states(problem: ContactProblem, problems: Sequence[ContactProblem], many
         many: the states as rows.
     """
 
-    def own_state(row: int) -> State:
+    def split_state(row: int) -> State:
+        """Return the state of one run, whose products are rows of those of all."""
         u = many.u[row]
         v = many.v[row]
         products = [("M", v, many.v), ("K", u, many.u)]
@@ -102,10 +109,10 @@ def own_states(problem: ContactProblem, problems: Sequence[ContactProblem], many
         r_t = None if many.r_t is None else many.r_t[row]
         return State(many.t, many.k, u, v, many.r_n[row], many.active[row], memory, r_t)
 
-    return Each(own_state)
+    return LazyRows(split_state)
 
 
-def own_step(problem: ContactProblem, many: StepProblem, row: int) -> StepProblem:
+def split_step(problem: ContactProblem, many: StepProblem, row: int) -> StepProblem:
     """Return the step of one run.
 
     Args:
@@ -115,18 +122,18 @@ def own_step(problem: ContactProblem, many: StepProblem, row: int) -> StepProble
     """
     slip0 = None if many.slip0 is None else many.slip0[row]
     return StepProblem(
-        many.A,
-        many.b[row],
-        many.bound,
-        many.surface,
-        many.scale,
-        many.guess[row],
-        many.active[row],
-        many.t,
-        many.k,
-        problem.friction,
-        slip0,
-        many.rate_factor,
+        A=many.A,
+        b=many.b[row],
+        bound=many.bound,
+        surface=many.surface,
+        scale=many.scale,
+        guess=many.guess[row],
+        active=many.active[row],
+        t=many.t,
+        k=many.k,
+        friction=problem.friction,
+        slip0=slip0,
+        rate_factor=many.rate_factor,
     )
 
 
@@ -141,7 +148,7 @@ class Loads(Load):
         return np.asarray(self.rows(t))
 
 
-def loads_of(problems: Sequence[ContactProblem]) -> Loads:
+def join_loads(problems: Sequence[ContactProblem]) -> Loads:
     """Return the loads of problems on one system.
 
     They differ in what shakes them, by few vectors times histories: the load of the body, which all
@@ -161,10 +168,11 @@ def loads_of(problems: Sequence[ContactProblem]) -> Loads:
             places.append((run, number, history))
     vectors = np.array(forces).reshape(len(forces), len(body.constant))
 
-    def rows(t: float) -> Array:
+    def sum_rows(t: float) -> Array:
+        """Return the loads of all runs at time t [s], as rows [N]."""
         factors = np.zeros((len(problems), len(vectors)))
         for run, number, history in places:
             factors[run, number] += evaluate_history(history, t)
         return np.asarray(body(t) + factors @ vectors)
 
-    return Loads(body.constant, rows=rows)
+    return Loads(body.constant, rows=sum_rows)

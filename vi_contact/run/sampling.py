@@ -19,6 +19,8 @@ from ..laws.excitation import FullSine, HalfSine, Rectangular, Tabulated
 # CHOSEN: steps in a period; a sine at its zeros and peaks still has its largest value at a step
 FEWEST = 4.0
 ROUNDED = 1e-6  # of a time step: round-off of its quotient with a period
+# attributes by which objects hold motions: of laws and loads here, of records, of bound methods
+# (__self__), functools.wraps (__wrapped__) and functools.partial (func)
 PARTS = (
     "excitation",
     "excitations",
@@ -35,18 +37,24 @@ DEEP = 5  # how far a motion is looked for in what holds it
 
 
 def sampling_warning(problem: ContactProblem, dt: float) -> str | None:
-    """Return a sentence when the time step [s] is too long for what acts.
+    """Return a sentence about the first motion or load for which the time step is too long.
 
-    This is an excitation, a load or a motion of the problem whose frequency, period or samples are
-    known. It is None when it is not, or nothing is known.
+    Judged are excitations, loads and motions whose frequency, period or samples are known.
+
+    Args:
+        problem: on which they act.
+        dt: the longest time step [s].
+
+    Returns:
+        The sentence; None where the step is short enough, or nothing is known.
     """
-    for source in _sources(problem):
-        for sentence in _sentences(source, dt):
+    for source in _list_sources(problem):
+        for sentence in _judge(source, dt):
             return sentence
     return None
 
 
-def _sources(problem: ContactProblem) -> Iterator[Any]:
+def _list_sources(problem: ContactProblem) -> Iterator[Any]:
     """Yield everything that acts as a function of the time.
 
     First come excitations, then loads, prescribed and moving parts.
@@ -63,7 +71,7 @@ def _sources(problem: ContactProblem) -> Iterator[Any]:
     yield from (surface.motion, surface.slide)
 
 
-def _sentences(source: Any, dt: float, depth: int = DEEP) -> Iterator[str]:
+def _judge(source: Any, dt: float, depth: int = DEEP) -> Iterator[str]:
     """Yield sentences about a source, or about the motions that it holds.
 
     Args:
@@ -74,40 +82,38 @@ def _sentences(source: Any, dt: float, depth: int = DEEP) -> Iterator[str]:
     if source is None or depth == 0:
         return
     name = type(source).__name__
-    spacing = _spacing(source)
+    spacing = _read_spacing(source)
+    frequency = _read_frequency(source)
     if spacing is not None:
         yield from _judge_samples(spacing, dt)
     elif isinstance(source, Tabulated):
-        spacing = float(np.median(np.diff(source.times)))
-        if dt > spacing * (1.0 + ROUNDED):
-            yield (
-                f"the time step of {dt:g} s is longer than the {spacing:g} s between the times of "
-                f"{name}, whose peaks fall between the steps: take a dt of at most {spacing:g} s"
-            )
+        yield from _judge_table(source, dt)
     elif isinstance(source, HalfSine | FullSine | Rectangular):
+        # The period of the sine that the pulse is cut from; a rectangle, which is cut from none,
+        # may not be shorter than a step.
         period = source.duration * {HalfSine: 2.0, FullSine: 1.0}.get(type(source), FEWEST)
         yield from _judge_period(f"{name} of {source.duration:g} s", period, dt)
-    elif (frequency := _frequency(source)) is not None:
+    elif frequency is not None:
         yield from _judge_period(f"{name} of {frequency:g} Hz", 1.0 / frequency, dt)
     else:
-        for held in _held(source):
-            yield from _sentences(held, dt, depth - 1)
+        for part in _look_inside(source):
+            yield from _judge(part, dt, depth - 1)
 
 
-def _spacing(source: Any) -> float | None:
+def _read_spacing(source: Any) -> float | None:
     """Return the distance [s] of the samples of a record, which holds them as ``acceleration``."""
     is_record = isinstance(getattr(source, "acceleration", None), np.ndarray)
     return getattr(source, "dt", None) if is_record else None
 
 
-def _frequency(source: Any) -> float | None:
+def _read_frequency(source: Any) -> float | None:
     """Return the frequency [Hz] that a motion, of the user's too, says that it has."""
     value: Any = getattr(source, "frequency", None)
     known = isinstance(value, int | float | np.number) and not isinstance(value, bool)
     return float(value) if known and 0.0 < float(value) < np.inf else None
 
 
-def _held(source: Any) -> Iterator[Any]:
+def _look_inside(source: Any) -> Iterator[Any]:
     """Yield what a function or an object may have its motion from.
 
     It is its owner, a part of it, or what it closes over.
@@ -141,24 +147,38 @@ def _judge_samples(spacing: float, dt: float) -> Iterator[str]:
         )
 
 
-def _judge_period(what: str, period: float, dt: float) -> Iterator[str]:
+def _judge_table(table: Tabulated, dt: float) -> Iterator[str]:
+    """Yield a sentence about a table whose times are, as a rule, nearer to each other than dt [s].
+
+    Their distance is the median: a table may begin and end with long pauses.
+    """
+    spacing = float(np.median(np.diff(table.times)))
+    if dt > spacing * (1.0 + ROUNDED):
+        yield (
+            f"the time step of {dt:g} s is longer than the {spacing:g} s between the times of "
+            f"{type(table).__name__}, whose peaks fall between the steps: take a dt of at most "
+            f"{spacing:g} s"
+        )
+
+
+def _judge_period(source: str, period: float, dt: float) -> Iterator[str]:
     """Yield a sentence about a sine, or a part of one, with too few steps in its period.
 
     Args:
-        what: it is, in words.
+        source: it, in words.
         period: of the sine [s].
         dt: the time step [s].
     """
     if dt <= period / FEWEST * (1.0 + ROUNDED):
         return
+    why = f"has only {period / dt:.3g} steps in the period of {period:g} s of {source}"
     halves = 2.0 * dt / period
-    blind = round(halves) >= 1 and abs(halves - round(halves)) <= ROUNDED * halves
-    why = (
-        f"is {round(halves)} times half the period of {what}, {0.5 * period:g} s, so that every "
-        "step sees the same value, or zero"
-        if blind
-        else f"has only {period / dt:.3g} steps in the period of {period:g} s of {what}"
-    )
+    whole = round(halves)
+    if whole >= 1 and abs(halves - whole) <= ROUNDED * halves:
+        why = (
+            f"is {whole} times half the period of {source}, {0.5 * period:g} s, so that every step "
+            "sees the same value, or zero"
+        )
     yield (
         f"the time step of {dt:g} s {why}: take a dt of at most {period / 20.0:g} s, "
         "a twentieth of the period"

@@ -1,6 +1,12 @@
 """Run the loop over certified steps.
 
-Everything that has to happen when it ends, well or badly, is done here.
+Everything that has to happen when it ends, well or badly, is done here. A run goes this way:
+
+    writer.open -> for every step: march, record -> at the end of a base step: frame, checkpoint if
+    one is due, signals and wall time -> last checkpoint, summary, Solution
+
+``Session.steps`` is a generator that stops after every base step, so that several runs can take
+turns (``simulate_many``). All ranks make the same calls; rank 0 alone writes and logs.
 """
 
 import logging
@@ -23,25 +29,26 @@ from ..core.collective import call_user, together
 from ..core.errors import InputError, Interrupted, OutOfTime, StepFailure
 from ..core.step import Recorder, Report, Row, State, StepResult
 from ..core.timing import take_report
-from .damping import NOT_COMPUTED, damping_in_words
+from .damping import NOT_COMPUTED, describe_damping
 from .files.checkpoint import RestartPoint
-from .files.identity import identity
-from .files.log import Progress, versions
+from .files.identity import identify
+from .files.log import Progress, list_versions
 from .files.table import Table
 from .files.writer import Writer
 from .march import March
-from .memory import in_words, memory
+from .memory import describe_memory, measure_memory
 from .method import Method
 from .request import RunRequest
 from .sampling import sampling_warning
 from .solution import Solution, energy_warning
 from .stop_signals import StopSignals
-from .time_steps import StepPlan, number_or_words, pieces_of
+from .time_steps import StepPlan, describe_plan, list_pieces
 from .wall_time import WallTime
 
 log = logging.getLogger(__name__)
 T = TypeVar("T")
 TIMED = 10_000  # the last steps, of which seconds_per_step is the median
+# why a run ended with an error that has no text of its own
 ENDED: dict[type[BaseException], str] = {
     KeyboardInterrupt: "interrupted by the user",
     GeneratorExit: "its steps were not asked for any more",
@@ -96,6 +103,7 @@ class Session:
 
     @property
     def _comm(self) -> Comm:
+        """Return the communicator of the ranks that share the run."""
         return self.method.problem.system.algebra.comm
 
     def settings(self) -> dict[str, Any]:
@@ -109,14 +117,14 @@ class Session:
             "scheme": repr(method.scheme),
             "mass": repr(problem.mass),
             "solver": repr(solver),
-            "dt": number_or_words(method.dt),
+            "dt": describe_plan(method.dt),
             "tolerance": method.tolerance,
             "ranks": self._comm.size,
             "unknowns": problem.system.space.unknowns,
             "contact_points": problem.surface.total,
             "boundaries": list(problem.system.notes),
-            "damping": damping_in_words(problem, unknown=NOT_COMPUTED),
-            "sampling": sampling_warning(problem, max(pieces_of(method.dt))[0]) or "",
+            "damping": describe_damping(problem, unknown=NOT_COMPUTED),
+            "sampling": sampling_warning(problem, max(list_pieces(method.dt))[0]) or "",
         }
 
     @property
@@ -127,10 +135,20 @@ class Session:
     def go(self, writer: Writer) -> Solution:
         """Make the remaining steps, and write everything before, during and after them."""
         with StopSignals() as signals:
+            # None after every base step, the solution in the end.
             return next(filter(None, self.steps(writer, signals)))
 
     def steps(self, writer: Writer, signals: StopSignals) -> Generator[Solution | None, None, None]:
-        """Make the remaining steps; yield None after every base step, the solution in the end."""
+        """Make the remaining steps; yield None after every base step, the solution in the end.
+
+        Args:
+            writer: of the files of the run.
+            signals: those that ask for its end.
+
+        Raises:
+            Interrupted: a signal came; OutOfTime: the wall time is nearly over; StepFailure, or
+                what a function of the user's raised. In all cases what was computed is saved first.
+        """
         begin = time.perf_counter()
         self.halved = self.place.halved
         try:
@@ -141,17 +159,19 @@ class Session:
             self._measure()
             linear = self._seconds_per_linear_step()
         except BaseException as error:
-            # whatever ends a run, what it has is saved; the error is raised again
+            # Whatever ends a run, what it has is saved; the error is raised again.
             interrupted = isinstance(error, KeyboardInterrupt | GeneratorExit)
             status = "interrupted" if interrupted else "failed"
             reason = str(error) or ENDED.get(type(error), type(error).__name__)
             seconds = time.perf_counter() - begin
             everywhere = getattr(error, "on_all_ranks", False)
             self._rescue(writer, status, reason, seconds, all_ranks=everywhere)
-            # on all ranks: none ends before the first has written
+            # A signal ends all ranks: none of them does before the first has written.
             if isinstance(error, Interrupted):
                 self._comm.bcast(None)
             raise
+
+        # The plan has come to its end, or the callback has asked for it.
         status = "stopped" if self.stopped else "finished"
         facts = self._facts(status, self.stopped, time.perf_counter() - begin) | {
             "seconds_per_linear_step": linear
@@ -174,7 +194,11 @@ class Session:
         """Make the steps, record each, and yield after every base step.
 
         A base step is where a frame, a checkpoint and the end of the run may stand; its halves are
-        recorded only.
+        recorded only. The time of a step, for the summary, counts all that is done for it here.
+
+        Args:
+            writer: of the files of the run.
+            signals: those that ask for its end.
         """
         place = self.place
         loop = self.loop or March(
@@ -185,10 +209,13 @@ class Session:
         self.wall_time.begin()
         with closing(Progress(self.left, shown=self.request.progress and self.root)) as progress:
             for state, report in loop:
+                # Every step: a row of the histories.
                 self._record(report, writer)
                 self.dt = loop.dt
                 self.halved = loop.halved
                 worst = max(worst, report.certificate.worst)
+
+                # The end of a base step: a place where the run can be left and continued.
                 if loop.ended:
                     self.place = RestartPoint(
                         state, place.t_start, place.k_start, loop.base, loop.halved
@@ -203,7 +230,9 @@ class Session:
                         )
                 self.seconds.append(time.perf_counter() - begin)
                 if len(self.seconds) == 1:
-                    self._measure()
+                    self._measure()  # the first step has made all factors
+
+                # Who asks for the end: the callback, a signal, or the wall time.
                 if self.request.callback is not None:
                     self._call(self.request.callback, report, writer)
                 if loop.ended and self.stopped:
@@ -290,9 +319,9 @@ class Session:
     def _measure(self) -> None:
         """Tell how much memory is taken, once all is set up and at the end. Collective."""
         A = None if self.last is None else self.last.step.A
-        self.memory = memory(self.method.problem, A)
+        self.memory = measure_memory(self.method.problem, A)
         if self.root:
-            log.info("%s", in_words(self.memory))
+            log.info("%s", describe_memory(self.memory))
 
     def _checkpoint(self, writer: Writer) -> None:
         """Write a checkpoint of the last base step, unless there is one. Collective."""
@@ -307,7 +336,7 @@ class Session:
         end = start + self.step_plan.length
         # histories of the user's are asked at other times than those of steps
         with together(self._comm):
-            run = identity(method.problem, method.scheme, method.dt, start=start, end=end)
+            run = identify(method.problem, method.scheme, method.dt, start=start, end=end)
         return {"run": run, "span": (start, end)}
 
     def _rescue(
@@ -340,7 +369,8 @@ class Session:
         if not self.root:
             return
         log.info(
-            "versions: %s", ", ".join(f"{name} {version}" for name, version in versions().items())
+            "versions: %s",
+            ", ".join(f"{name} {version}" for name, version in list_versions().items()),
         )
         for name, value in self.settings().items():
             if name != "sampling":
@@ -369,7 +399,7 @@ class Session:
         return {
             "status": status,
             "reason": reason,
-            "versions": versions("h5py"),
+            "versions": list_versions("h5py"),
             **self.settings(),
             "restarted_from_step": self.resumed_from,
             **self.table.facts(),
@@ -398,6 +428,7 @@ class Session:
         none = np.zeros(problem.surface.count)
 
         def linear_step() -> None:
+            """Make a step as if there were no contact."""
             step = scheme.step(problem, old, A, dt)
             result = StepResult(A.factor.solve(step.b), none, none.astype(bool), 0, "linear")
             scheme.finish(problem, old, step, result, dt)

@@ -1,6 +1,18 @@
 """Simulate: march, listen with recorders, and keep everything in a folder.
 
-A crash cannot spoil the folder.
+``simulate`` is one call with many arguments. What becomes of them, in this order:
+
+1. ``RunRequest`` (request.py) checks the arguments by themselves.
+2. ``choose_method`` (method.py) checks them against the problem, and fills in scheme and solver.
+3. ``open_run``, here, locks the folder, finds the first state, starts the recorders, and takes over
+   the rows of a run that is continued.
+4. ``Session`` (session.py) makes the steps (march.py), records each, and saves what there is
+   however the run ends; ``Writer`` (files/writer.py) writes the files. A crash cannot spoil them.
+5. ``Solution`` (solution.py) is what the user gets.
+
+*Base steps* are those of the plan; ``HalvedAtImpact`` may make several steps of one. On several
+ranks all of this is called by all of them, and ``with together(comm)`` raises an error of one rank,
+as a function of the user's may raise, on all.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -30,7 +42,7 @@ from .recorders.steps import Steps
 from .request import CrossCheck, RunRequest
 from .session import Session
 from .solution import Solution
-from .time_steps import TimeSteps, step_plan
+from .time_steps import TimeSteps, plan_steps
 from .wall_time import WallTime
 
 __all__ = ["Solution", "simulate"]
@@ -140,34 +152,40 @@ def open_run(
 ) -> Iterator[tuple[Session, Writer]]:
     """Check a request, and hold its run, set up in its locked folder, until the block ends.
 
-    Collective.
+    The folder is made and locked here; files in it are opened, or replaced, when the session
+    begins. Collective.
 
     Args:
         request: the arguments of ``simulate``.
         others: problems that lend their matrices and factors to it, if they are its own.
         runs: how many runs take turns in this process, for its wall time.
 
+    Yields:
+        The run before its first step, and what writes its files.
+
     Raises:
         InputError: before anything is computed or overwritten, as of ``simulate``.
     """
+    # What can be refused is refused before anything is computed or the folder is touched.
     request.check()
     wall_time = WallTime(request.wall_time, runs)
-    method = _method_of(request, others)
+    method = _choose_method(request, others)
     comm = request.comm
     folder = None if request.out is None else run_folder(comm, request.out)
-    source = _folder_to_continue(request.restart, folder)
-    recorders = _all_recorders(request.record)
+    source = _find_source(request.restart, folder)
+    recorders = _list_recorders(request.record)
     with lock_folder(comm, folder):
         # The first state: that of the checkpoint, of an earlier stage, or at rest. The scheme adds
         # its memory of earlier steps, which depends on the length of the first one.
-        place, checksum = _first_place(request, method, source)
-        plan = step_plan(request.dt, request.steps, request.t_end, place.t_start)
+        place, checksum = _find_start(request, method, source)
+        plan = plan_steps(request.dt, request.steps, request.t_end, place.t_start)
         with together(comm):
             first = method.scheme.start(method.problem, place.state, plan.dt(place.base))
         place = replace(place, state=first)
 
         # The recorders name their columns, which the table needs to read rows of an earlier run;
-        # then they start once more from the last of these rows, where their sums over time go on.
+        # of a run that is continued they start once more, from the last of these rows, where their
+        # sums over time go on.
         columns, row = _start_recorders(method.problem, recorders, place.state)
         table = Table(columns, row, None if folder is None else folder / HISTORY_H5, comm)
         stored = None
@@ -189,7 +207,7 @@ def open_run(
         yield session, Writer(method.problem, folder, request.fields, table, stored)
 
 
-def _method_of(request: RunRequest, others: Sequence[ContactProblem]) -> Method:
+def _choose_method(request: RunRequest, others: Sequence[ContactProblem]) -> Method:
     """Return how the run is marched, checked; ``others`` lend their matrices. Collective."""
     problem, scheme = with_defaults(request.problem, request.scheme, others)
     return choose_method(
@@ -205,8 +223,10 @@ def _method_of(request: RunRequest, others: Sequence[ContactProblem]) -> Method:
     )
 
 
-def _folder_to_continue(restart: bool | str | Path, folder: Path | None) -> Path | None:
+def _find_source(restart: bool | str | Path, folder: Path | None) -> Path | None:
     """Return the folder of the run to continue, None for a new run.
+
+    It is this run's own folder for True; a path may be of another run, whose folder stays as it is.
 
     Args:
         restart: as of ``simulate``; a path may be that of a folder or of its checkpoint.
@@ -220,19 +240,28 @@ def _folder_to_continue(restart: bool | str | Path, folder: Path | None) -> Path
     return path.parent if path.suffix == ".npz" else path
 
 
-def _all_recorders(record: Sequence[Recorder] | None) -> list[Recorder]:
+def _list_recorders(record: Sequence[Recorder] | None) -> list[Recorder]:
     """Return the recorder of every run, then those that were asked for."""
     if record is None:
         return [Steps(), Energy(), Contact()]
     return [Steps(), *record]
 
 
-def _first_place(
+def _find_start(
     request: RunRequest, method: Method, source: Path | None
 ) -> tuple[RestartPoint, str]:
-    """Return (where the run begins, checksum of the rows that its checkpoint belongs to).
+    """Return where the run begins: at a checkpoint, in the user's state, or in u0 and v0.
 
-    The checksum of a new run is "". Collective.
+    Collective.
+
+    Args:
+        request: the arguments of ``simulate``.
+        method: how the run is marched.
+        source: the folder of the run to continue, None for a new run.
+
+    Returns:
+        The state with the base steps done before it, and the checksum of the rows that belong to
+        the checkpoint, "" for a new run.
     """
     if source is not None:
         return read_checkpoint(
@@ -267,6 +296,9 @@ def _start_recorders(
         InputError: two recorders have the same column, or the columns differ between ranks.
     """
     comm = problem.system.algebra.comm
+
+    # All recorders start before an error of one of them is raised, on all ranks: their calls may be
+    # collective.
     row: dict[str, Any] = {}
     with together(comm):
         for recorder in recorders:
@@ -294,14 +326,22 @@ def _restore(table: Table, stored: StoredRows, comm: Comm) -> Row:
     """Put the rows of an earlier run into the table, and return the last of them.
 
     Arrays stay on rank 0, which reads the file; the numbers go to all ranks. Collective.
+
+    Args:
+        table: with the columns of this run.
+        stored: the rows of the earlier run.
+        comm: of the ranks that share the run.
     """
     blocks = stored.blocks()
     last: Row = {}
     while True:
-        whole = on_root(comm, lambda: next(blocks, None))
-        numbers = None if whole is None else {name: whole[name] for name in table.numbers}
+        # Rank 0 reads a block of rows, and hands out its numbers; None ends it on all ranks.
+        whole = on_root(comm, lambda: next(blocks, None))  # None on the other ranks
+        numbers = None
+        if whole is not None:
+            numbers = {name: whole[name] for name in table.numbers}
         block: Block | None = comm.bcast(numbers)
         if block is None:
             return last
-        table.restore(whole or block)
+        table.restore(block if whole is None else whole)
         last = {name: values[-1] for name, values in block.items()}

@@ -13,7 +13,7 @@ from typing import Any
 
 from ..core.checks import several
 from ..core.errors import InputError, Interrupted, ViContactError
-from .files.log import turn_of
+from .files.log import give_turn
 from .request import RunRequest
 from .session import Session
 from .simulate import open_run, simulate
@@ -45,8 +45,9 @@ def simulate_many(
         Interrupted, OutOfTime: as of ``simulate``, when all runs that have begun have written their
             checkpoints: ``restart=True`` continues them.
     """
-    given = several("simulate_many", "runs", runs, "give a list of arguments of simulate")
-    requests = [_request(run) for run in given]
+    # Check the arguments that runs must not share, before one is opened.
+    checked = several("simulate_many", "runs", runs, "give a list of arguments of simulate")
+    requests = [_make_request(run) for run in checked]
     recorders: list[int] = []
     folders: list[Path] = []
     for request in requests:
@@ -57,7 +58,7 @@ def simulate_many(
             folders.append(Path(request.out).resolve())
     _refuse_shared("recorder", recorders)
     _refuse_shared("folder", folders)
-    return _in_turn(requests, tell)
+    return _simulate_in_turn(requests, tell)
 
 
 def _refuse_shared(kind: str, things: Sequence[Hashable]) -> None:
@@ -69,7 +70,7 @@ def _refuse_shared(kind: str, things: Sequence[Hashable]) -> None:
         )
 
 
-def _request(run: Mapping[str, Any]) -> RunRequest:
+def _make_request(run: Mapping[str, Any]) -> RunRequest:
     """Return the request of a call of ``simulate`` with these arguments, without progress line.
 
     The names are the user's, so the signature of ``simulate`` says here which are known and what is
@@ -106,7 +107,7 @@ class _Turn:
     def step(self) -> Solution | ViContactError | Interrupted | None:
         """Make a base step; return what the run has ended with, None when it goes on."""
         self.begun = True
-        with turn_of(self):
+        with give_turn(self):
             try:
                 return next(self.steps)
             except (ViContactError, Interrupted) as error:
@@ -114,7 +115,7 @@ class _Turn:
 
     def close(self) -> None:
         """End a run that nobody waits for any more, with its checkpoint."""
-        with turn_of(self):
+        with give_turn(self):
             self.steps.close()
         # the matrices of a run that has ended serve nobody
         self.session.last = None
@@ -122,11 +123,19 @@ class _Turn:
         self.loop.prepared.clear()
 
 
-def _in_turn(requests: Sequence[RunRequest], tell: Callable[[float], None]) -> Iterator[Ended]:
-    """Make a base step of every run in turn, until all have ended."""
+def _simulate_in_turn(
+    requests: Sequence[RunRequest], tell: Callable[[float], None]
+) -> Iterator[Ended]:
+    """Make a base step of every run in turn, until all have ended.
+
+    Args:
+        requests: of the runs.
+        tell: gets the share of all steps that is done.
+    """
     going: list[_Turn] = []
-    stopped: Interrupted | None = None
+    stopped: Interrupted | None = None  # the first error that ends all runs
     with StopSignals(lasting=True) as signals, ExitStack() as stack:
+        # Open all runs; whatever ends this function closes each of them, with its checkpoint.
         for number, request in enumerate(requests):
             others = [turn.session.method.problem for turn in going]
             try:
@@ -137,11 +146,14 @@ def _in_turn(requests: Sequence[RunRequest], tell: Callable[[float], None]) -> I
                 yield number, error
                 continue
             place = session.place
-            loop = session.loop = Together(
+            loop = Together(
                 session.method, session.step_plan, place.state, place.base, place.halved
             )
+            session.loop = loop
             going.append(_Turn(number, session, loop, session.steps(writer, signals)))
             stack.callback(going[-1].close)
+
+        # Runs of one body get into groups, and base steps are made until no run is left.
         group_runs([turn.loop for turn in going])
         made = 0
         total = sum(turn.session.left for turn in going)
@@ -159,6 +171,9 @@ def _in_turn(requests: Sequence[RunRequest], tell: Callable[[float], None]) -> I
                     ends.append(turn.step())
             made += len(turns)
             tell(min(made / max(total, 1), 1.0))
+
+            # Who has ended leaves its group. A signal, or the end of the wall time, ends those too
+            # that have begun, each in its turn; the others never begin.
             for turn, end in zip(turns, ends, strict=True):
                 if end is None:  # what was done in the turn of one run was done for all
                     turn.session.seconds[-1] = (time.perf_counter() - begin) / len(turns)

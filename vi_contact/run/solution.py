@@ -8,7 +8,7 @@ from importlib import import_module
 from io import BytesIO
 from pathlib import Path
 from textwrap import shorten, wrap
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,52 +18,62 @@ from ..core.problem import ContactProblem
 from ..core.step import Columns, State
 from .files.table import LEDGER
 
-# Lines of the summary, in its four parts: name, text, and the fact without which the line is left
-# out. A line without a name is a sentence.
-LINES: Mapping[str, Sequence[tuple[str, ...]]] = {
-    "run": (
-        (
-            "",
-            (
-                "run {status}: {steps} steps {length}, t = {t_start:g} to {t_end:g} s, on {ranks} "
-                "rank{s}"
-            ),
-        ),
-        ("scheme", "{scheme}"),
-        ("mass matrix", "{mass}"),
-        ("solver", "{solver}"),
-        ("damping", "{damping}", "damping"),
-        ("unknowns, contact points", "{unknowns}, {contact_points}"),
-        (
-            "iterations per step",
-            "{iterations_per_step[mean]:.2f} on average, {iterations_per_step[max]} at most",
-        ),
-        ("worst certificate", "{worst_certificate:.2e}"),
-        ("escalated steps", "{escalated_steps}"),
-        ("halved steps", "{halved_steps}", "halved_steps"),
-        (
-            "steps in contact",
-            "{steps_in_contact}, largest uplift {largest_uplift:.3f}",
-            "steps_in_contact",
-        ),
-        ("smallest gap", "{smallest_gap:.3e} m", "steps_in_contact"),
+CREATED = 0.01  # of the largest energy: more than schemes without a fault gain at sensible steps
+
+
+class Line(NamedTuple):
+    """Hold a line of the summary.
+
+    Attributes:
+        name: what stands before the value; a line without a name is a sentence.
+        text: the value, with the facts in braces.
+        needs: the fact without which the line is left out, "" where it always stands.
+    """
+
+    name: str
+    text: str
+    needs: str = ""
+
+
+# The summary in its four parts. Lines of cross-checks stand after the first, those of the ledger
+# after the second, warnings after the third.
+RUN = (
+    Line(
+        "",
+        "run {status}: {steps} steps {length}, t = {t_start:g} to {t_end:g} s, on {ranks} rank{s}",
     ),
-    "energy": (
-        ("", "  energy ledger [J]", "energy"),
-        ("  energy at the start", "{energy[energy_start]: .6e}", "energy"),
+    Line("scheme", "{scheme}"),
+    Line("mass matrix", "{mass}"),
+    Line("solver", "{solver}"),
+    Line("damping", "{damping}", "damping"),
+    Line("unknowns, contact points", "{unknowns}, {contact_points}"),
+    Line(
+        "iterations per step",
+        "{iterations_per_step[mean]:.2f} on average, {iterations_per_step[max]} at most",
     ),
-    "defect": (("  defect, relative", "{energy_defect: .2e}", "energy"),),
-    "end": (
-        (
-            "wall time per step",
-            "{seconds_per_step:.3e} s{ratio} (with records{and_output})",
-            "ratio",
-        ),
-        ("reason", "{reason}", "reason"),
+    Line("worst certificate", "{worst_certificate:.2e}"),
+    Line("escalated steps", "{escalated_steps}"),
+    Line("halved steps", "{halved_steps}", "halved_steps"),
+    Line(
+        "steps in contact",
+        "{steps_in_contact}, largest uplift {largest_uplift:.3f}",
+        "steps_in_contact",
     ),
-}
-# Of the largest energy: more than schemes without a fault gain at sensible time steps.
-CREATED = 0.01
+    Line("smallest gap", "{smallest_gap:.3e} m", "steps_in_contact"),
+)
+ENERGY = (
+    Line("", "  energy ledger [J]", "energy"),
+    Line("  energy at the start", "{energy[energy_start]: .6e}", "energy"),
+)
+DEFECT = (Line("  defect, relative", "{energy_defect: .2e}", "energy"),)
+END = (
+    Line(
+        "wall time per step",
+        "{seconds_per_step:.3e} s{ratio} (with records{and_output})",
+        "ratio",
+    ),
+    Line("reason", "{reason}", "reason"),
+)
 
 
 @dataclass(frozen=True)
@@ -130,7 +140,7 @@ class Solution:
     def summary(self) -> str:
         """Return the run in a few lines for people."""
         lines = []
-        for name, value in _entries(self.facts):
+        for name, value in _list_entries(self.facts):
             lines.append(f"  {name:<26} {value}" if name else value)
         return "\n".join(lines)
 
@@ -145,9 +155,12 @@ class Solution:
         return import_module("vi_contact.practice.plots").plot_overview(self)
 
     def _repr_html_(self) -> str:
-        """Return summary and figure for a notebook, without reference to anything outside."""
+        """Return summary and figure for a notebook, which calls this by its name.
+
+        The figure is in the text, so that it refers to nothing outside.
+        """
         rows = ""
-        for name, value in _entries(self.facts):
+        for name, value in _list_entries(self.facts):
             if name:
                 rows += f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>"
             else:
@@ -162,9 +175,9 @@ class Solution:
 
 
 def energy_warning(facts: Mapping[str, Any]) -> str | None:
-    """Return a sentence when the run had more energy than was put in.
+    """Return a sentence when the run had more energy than was put in; None when it had not.
 
-    It is so when the excess is more than CREATED of the largest energy.
+    It had when the excess, ``energy_created`` of the facts, is above CREATED.
     """
     if facts.get("energy_created", 0.0) <= CREATED:
         return None
@@ -176,35 +189,38 @@ def energy_warning(facts: Mapping[str, Any]) -> str | None:
     )
 
 
-def _entries(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
+def _list_entries(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return (name, value) of every line of the summary; those without a name are whole lines."""
-    words = _words_of(facts)
-    entries = _lines("run", words)
+    words = _put_in_words(facts)
+    entries = _fill_in(RUN, words)
     for method, difference in (facts["cross_check"] or {}).items():
         values = ", ".join(f"{name} {value:.2e}" for name, value in difference.items())
         entries.append((f"cross-check {method}", values))
-    entries += _lines("energy", words)
+    entries += _fill_in(ENERGY, words)
     if "energy" in facts:
         for name, title in LEDGER.items():
             if name != "energy_defect":
                 entries.append((f"  {title}", f"{facts['energy'][name]: .6e}"))
-    entries += _lines("defect", words)
+    entries += _fill_in(DEFECT, words)
     for warning in filter(None, (energy_warning(facts), facts.get("sampling"))):
         text = f"WARNING: {warning}"
         for line in wrap(text, 110, initial_indent="  ", subsequent_indent="  "):
             entries.append(("", line))
-    return entries + _lines("end", words)
+    return entries + _fill_in(END, words)
 
 
-def _words_of(facts: Mapping[str, Any]) -> dict[str, Any]:
+def _put_in_words(facts: Mapping[str, Any]) -> dict[str, Any]:
     """Return what fills in the lines of the summary: the facts, some of them in words.
 
     A fact that is None leaves out the lines that need it.
     """
+    # A constant time step is a number in the facts, a plan of steps a text.
     dt = facts["dt"]
-    length = (
-        f"({facts['base_steps']} base steps of {dt})" if isinstance(dt, str) else f"of {dt:g} s"
-    )
+    length = f"({facts['base_steps']} base steps of {dt})"
+    if not isinstance(dt, str):
+        length = f"of {dt:g} s"
+
+    # The time of a step, and of a linear one with the same matrix: nan where they were not taken.
     mean = facts["seconds_per_step"]
     plain = facts["seconds_per_linear_step"]
     ratio = None
@@ -224,10 +240,10 @@ def _words_of(facts: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _lines(part: str, words: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return (name, value) of the lines of a part of ``LINES`` for which there are words."""
-    lines = []
-    for name, text, *needs in LINES[part]:
-        if all(words.get(fact) is not None for fact in needs):
-            lines.append((name, text.format_map(words)))
-    return lines
+def _fill_in(lines: Sequence[Line], words: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return (name, value) of the lines for which there are words."""
+    entries = []
+    for line in lines:
+        if not line.needs or words.get(line.needs) is not None:
+            entries.append((line.name, line.text.format_map(words)))
+    return entries

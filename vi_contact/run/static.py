@@ -81,16 +81,18 @@ def _warn_if_open(problem: ContactProblem, state: State) -> None:
 
     A contact without any pressure is let be. Collective.
     """
-    # Areas of what touched, and of what of it has opened, of all ranks.
+    # Sum of reactions, area of what touched, and of what of it has opened, of all ranks.
     surface = problem.surface
-    touching = surface.gap0 <= TOUCHING * largest(surface.comm, max_abs(surface.points))
+    size = largest(surface.comm, max_abs(surface.points))  # of the coordinates [m]
+    touching = surface.gap0 <= TOUCHING * size
     lifted = touching & ~state.active
     sums = [state.r_n.sum(), surface.weights[touching].sum(), surface.weights[lifted].sum()]
     pressed, area, lost = surface.comm.sum(np.array(sums))
     if pressed <= 0.0 or lost <= OPEN * area:
         return
 
-    # The open point with the lowest number: of all ranks one has it, and tells its place by a sum.
+    # The open point with the lowest number. One rank has it, and tells its place to all by a sum to
+    # which the others add zero.
     first = -largest(surface.comm, np.max(-surface.slots[lifted].astype(float), initial=-np.inf))
     own = lifted & (surface.slots == first)
     place = surface.comm.sum(surface.points[own].sum(axis=0))
@@ -106,7 +108,12 @@ def _warn_if_open(problem: ContactProblem, state: State) -> None:
 
 
 class Equilibria:
-    """Solve static stages of one problem, with one factorisation, or none, for all."""
+    """Solve static stages of one problem, with one factorisation, or none, for all.
+
+    Where prescribed displacements hold every body, K is positive definite, and a stage is one step
+    of the contract (``core.step``) with A = K. Where contact alone holds one, K is singular, and
+    the stage is a sequence of such steps (``proximal``).
+    """
 
     def __init__(
         self, problem: ContactProblem, *, solver: Solver | None = None, tolerance: float = TOLERANCE
@@ -133,7 +140,12 @@ class Equilibria:
             self._solve = lambda step: certified.solve(step)[0]
 
     def solve(self, old: State, t: float) -> State:
-        """Return the equilibrium at time t [s]; points that rub slide from where ``old`` was."""
+        """Return the equilibrium at a time. Collective.
+
+        Args:
+            old: the state before, from where points that rub slide, and where the solver begins.
+            t: the time [s], at which loads and motions are taken.
+        """
         problem = self._problem
         # loads, motions and laws of the user's may fail on one rank
         with together(problem.surface.comm):
@@ -197,6 +209,8 @@ def quasi_static(
         {"times": times, "solver": solver, "state": Parts(state), "tolerance": tolerance},
     )
     check_methods("quasi_static", solver, (), tolerance)
+
+    # A law without rates returns itself at any rate.
     if problem.friction.at(np.zeros(problem.surface.count)) is not problem.friction:
         raise InputError(
             f"load steps have no slip rate for {problem.friction}: use Coulomb with the "
@@ -207,27 +221,25 @@ def quasi_static(
             state = initial_state(problem)
     else:
         check_sizes("quasi_static", problem, state)
-    stages = _increasing(times, state.t)
+    stages = _check_times(times, state.t)
     equilibria = Equilibria(problem, solver=solver, tolerance=tolerance)
-    return _each_after_the_other(equilibria, state, stages)
+    return _solve_in_turn(equilibria, state, stages)
 
 
-def _each_after_the_other(
-    equilibria: Equilibria, state: State, times: Iterable[float]
-) -> Iterator[State]:
+def _solve_in_turn(equilibria: Equilibria, state: State, times: Iterable[float]) -> Iterator[State]:
     """Yield the equilibrium at each of the times [s], the first after ``state``."""
     for t in times:
         state = replace(equilibria.solve(state, t), k=state.k + 1)
         yield state
 
 
-def _increasing(times: Iterable[float], start: float) -> list[float]:
+def _check_times(times: Iterable[float], start: float) -> list[float]:
     """Return the times [s] as a list; InputError unless they increase from the start [s] on."""
     if not isinstance(times, Iterable) or isinstance(times, str | bytes):
         raise InputError(f"load steps at {quote(times)}: give times in seconds")
     order = [real(t) for t in times]
-    ways = np.diff([start, *order])
-    if not (np.all(np.isfinite(ways)) and np.all(ways >= 0.0) and np.all(ways[1:] > 0.0)):
+    spans = np.diff([start, *order])  # the first stage may be at the time of the state
+    if not (np.all(np.isfinite(spans)) and np.all(spans >= 0.0) and np.all(spans[1:] > 0.0)):
         raise InputError(
             f"load steps from t = {start:g} s at {order}: give times that increase, none before "
             "the start"

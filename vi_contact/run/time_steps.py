@@ -50,7 +50,7 @@ class Schedule:
             raise InputError(
                 "Schedule has no pieces: give at least one (dt, until); until may be math.inf"
             )
-        object.__setattr__(self, "pieces", tuple((_positive(dt), until) for dt, until in pairs))
+        object.__setattr__(self, "pieces", tuple((_read_dt(dt), until) for dt, until in pairs))
         for (_, before), (_, until) in pairwise([(0.0, -inf), *self.pieces]):
             if not until > before:
                 raise InputError(
@@ -76,7 +76,7 @@ class HalvedAtImpact:
 
     def __post_init__(self) -> None:
         if not isinstance(self.dt, Schedule):
-            object.__setattr__(self, "dt", _positive(self.dt))
+            object.__setattr__(self, "dt", _read_dt(self.dt))
         remedy = (
             f"HalvedAtImpact halvings is {quote(self.halvings)}: give a whole number from 0 to "
             f"{HALVINGS}"
@@ -87,19 +87,19 @@ class HalvedAtImpact:
 TimeSteps = float | Schedule | HalvedAtImpact
 
 
-def number_or_words(plan: TimeSteps) -> float | str:
+def describe_plan(plan: TimeSteps) -> float | str:
     """Return, for checkpoint and summary, a constant dt as the number it is, a plan in words."""
     return repr(plan) if isinstance(plan, Schedule | HalvedAtImpact) else plan
 
 
-def pieces_of(plan: TimeSteps) -> tuple[tuple[float, float], ...]:
+def list_pieces(plan: TimeSteps) -> tuple[tuple[float, float], ...]:
     """Return the pieces (dt, until) of a plan, endless for a constant dt [s].
 
     Raises:
         InputError: there is no dt.
     """
     dt = plan.dt if isinstance(plan, HalvedAtImpact) else plan
-    return dt.pieces if isinstance(dt, Schedule) else ((_positive(dt), inf),)
+    return dt.pieces if isinstance(dt, Schedule) else ((_read_dt(dt), inf),)
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,9 @@ class StepPlan:
         return self.parts[-1][0]
 
 
-def step_plan(plan: TimeSteps, steps: int | None, t_end: float | None, t0: float = 0.0) -> StepPlan:
+def plan_steps(
+    plan: TimeSteps, steps: int | None, t_end: float | None, t0: float = 0.0
+) -> StepPlan:
     """Return the base steps from t0 to t_end, or so many.
 
     Counted from the times of the plan, not from those of the run, whose round-off accumulates: a
@@ -149,8 +151,8 @@ def step_plan(plan: TimeSteps, steps: int | None, t_end: float | None, t0: float
         InputError: plan, steps or t_end make no sense, or there are more than 1e9 steps.
     """
     halvings = plan.halvings if isinstance(plan, HalvedAtImpact) else 0
-    pieces = pieces_of(plan)
-    left = _most_steps(steps, t_end, t0)
+    pieces = list_pieces(plan)
+    left = _limit_steps(steps, t_end, t0)
     parts: list[tuple[float, int]] = []
     t = t0
     total = 0
@@ -158,7 +160,7 @@ def step_plan(plan: TimeSteps, steps: int | None, t_end: float | None, t0: float
         # So many steps of this piece as reach its end or t_end, and as are left of ``steps``.
         last = t_end is not None and t_end <= until + SLACK * size
         end = t_end if last and t_end is not None else until
-        count = int(min(_steps_over(end - t, size), left, LARGEST + 1))
+        count = int(min(_count_steps(end - t, size), left, LARGEST + 1))
         total += count
         if total > LARGEST:
             goal = "the run" if t_end is None else f"the run to t_end = {t_end:g} s"
@@ -182,7 +184,7 @@ def step_plan(plan: TimeSteps, steps: int | None, t_end: float | None, t0: float
     )
 
 
-def _steps_over(span: float, size: float) -> float:
+def _count_steps(span: float, size: float) -> float:
     """Return how many steps of a size [s] reach over a span [s], infinite for an endless one."""
     quotient = span / size
     if not isfinite(quotient):
@@ -190,7 +192,7 @@ def _steps_over(span: float, size: float) -> float:
     return max(ceil(quotient - max(SLACK, 1e-12 * quotient)), 0)
 
 
-def _most_steps(steps: int | None, t_end: float | None, t0: float) -> float:
+def _limit_steps(steps: int | None, t_end: float | None, t0: float) -> float:
     """Return how many steps there are at most, infinite when t_end [s] counts.
 
     Raises:
@@ -211,7 +213,7 @@ def _most_steps(steps: int | None, t_end: float | None, t0: float) -> float:
     return int(_read(whole, steps, remedy))
 
 
-def _positive(dt: Any) -> float:
+def _read_dt(dt: Any) -> float:
     """Return a time step [s] as a float; InputError for what is none."""
     remedy = (
         f"dt is {quote(dt)}: give a positive time step in seconds, a Schedule or HalvedAtImpact"

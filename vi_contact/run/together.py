@@ -6,6 +6,10 @@ The scheme steps the rows as it steps one state, and the solver answers them tog
 (``solve_many``); certificates, impacts and reports are a run's own. A step that is not answered at
 once with a certificate far below the tolerance is solved alone; who then has to escalate, or fails,
 goes on alone.
+
+A ``Together`` is one run, and yields what ``March`` yields. When it is asked for a step and has
+none, its ``Group`` makes the next step of all runs of it, and each run keeps its report until it is
+asked (``waiting``). Who leaves a group goes on as a plain ``March`` from where it is.
 """
 
 from collections import deque
@@ -24,7 +28,7 @@ from ..core.verify import kkt_residuals
 from ..solvers.certified import NEAR, CertifiedSolver
 from .march import March, after_impact
 from .method import Method
-from .rows import Each, RowReport, join_states, loads_of, own_states, own_step
+from .rows import LazyRows, RowReport, join_loads, join_states, split_states, split_step
 from .time_steps import StepPlan
 
 
@@ -62,7 +66,7 @@ class Together(March):
     def leave(self) -> None:
         """Let the others go on without it."""
         if self.group is not None:
-            self.group.without([self])
+            self.group.release([self])
 
 
 def group_runs(runs: Sequence[Together]) -> None:
@@ -83,7 +87,7 @@ def group_runs(runs: Sequence[Together]) -> None:
         for group in groups:
             first = group[0]
             shared = problem.beside(first.method.problem)
-            if shared is not None and _place_and_method(first) == _place_and_method(run):
+            if shared is not None and _describe_place(first) == _describe_place(run):
                 run.method = replace(run.method, problem=shared)
                 group.append(run)
                 break
@@ -93,7 +97,7 @@ def group_runs(runs: Sequence[Together]) -> None:
         Group(group)
 
 
-def _place_and_method(run: Together) -> tuple[Any, ...]:
+def _describe_place(run: Together) -> tuple[Any, ...]:
     """Return where a run is, and how it goes on."""
     return (
         run.state.t,
@@ -108,8 +112,9 @@ def _place_and_method(run: Together) -> tuple[Any, ...]:
 class Group:
     """Hold runs of one system, surface, scheme and tolerance that are at the same step.
 
-    ``_problem`` is that of all runs, whose loads are rows; ``_problems`` are their own. The states
-    are there twice: ``_many`` as rows, ``_states`` one by one.
+    ``_runs`` are its members, in the order of the rows, none when it has dissolved. ``_problem`` is
+    that of all runs, whose loads are rows; ``_problems`` are their own. The states are there twice:
+    ``_many`` as rows, ``_states`` one by one. ``_A`` and ``_solver`` are for steps of ``_dt`` [s].
     """
 
     def __init__(self, runs: Sequence[Together]) -> None:
@@ -132,15 +137,15 @@ class Group:
             self._problems = [run.method.problem for run in runs]
             first = self._problems[0]
             self._problem = replace(first)
-            self._problem.__dict__["equations"] = first.unshaken.loaded(loads_of(self._problems))
+            self._problem.__dict__["equations"] = first.unshaken.loaded(join_loads(self._problems))
             self._take_states(states)
 
     def _take_states(self, states: list[State]) -> None:
         """Hold the states of the runs as rows, and one by one."""
         self._many = join_states(states)
-        self._states = Each(states.__getitem__)
+        self._states = LazyRows(states.__getitem__)
 
-    def without(self, leaving: Sequence[Together]) -> None:
+    def release(self, leaving: Sequence[Together]) -> None:
         """Let these runs go on alone from where they are."""
         for row, run in enumerate(self._runs):
             run.group = None
@@ -169,7 +174,7 @@ class Group:
             if not leaving:
                 self._base += 1
                 return
-            self.without(leaving)
+            self.release(leaving)
 
     def _begin(self, dt: float) -> None:
         """Let the scheme begin anew with steps of dt [s]: the first, or one of another length."""
@@ -181,7 +186,7 @@ class Group:
         self._A = self._scheme.effective_matrix(self._problem, dt)
         self._solver = None
 
-    def _solve(self, many: StepProblem, steps: Each) -> Any:
+    def _solve(self, many: StepProblem, steps: LazyRows) -> Any:
         """Return the answers of the first solver to all rows, None if it cannot take them so."""
         if self._solver is None:
             solvers = self._runs[0].method.solvers
@@ -218,7 +223,7 @@ class Group:
 
         # The solver answers all rows at once, if it can.
         problems = self._problems
-        steps = Each(lambda row: own_step(problems[row], many, row))
+        steps = LazyRows(lambda row: split_step(problems[row], many, row))
         answers = self._solve(many, steps)
         if answers is None:
             return list(runs)
@@ -227,7 +232,7 @@ class Group:
                 run.prepared = {dt: (self._A, self._solver)}
 
         # Each answer gets its certificate, then states and reports are made.
-        parts = {"step": steps, "result": Each(answers.own)}
+        parts = {"step": steps, "result": LazyRows(answers.own)}
         leaving = list(answers.failed)
         if not leaving:
             result, leaving = self._judge(many, answers.rows, parts)
@@ -291,12 +296,13 @@ class Group:
         rows = scheme.finish(self._problem, self._many, many, result, dt)
         for vector in (rows.u, rows.v, *rows.memory.values()):
             freeze(vector)  # what is known of them stays true
-        free = own_states(self._problem, problems, rows)
+        free = split_states(self._problem, problems, rows)
         self._many, self._states = self._apply_impact(rows, free, dt)
         system = self._problem.equations
         loads = [("load", t, t) for t in system.times]
 
-        def averages(row: int) -> Callable[[], Balance]:
+        def make_averages(row: int) -> Callable[[], Balance]:
+            """Return what makes the balance of one run."""
             problems[row].equations.know_rows(system, row, *loads)
             return partial(scheme.balance, problems[row], old[row], free[row], dt)
 
@@ -304,14 +310,14 @@ class Group:
             "problem": problems,
             "old": old,
             "new": self._states,
-            "v_minus": Each(lambda row: free[row].v),
-            "averages": Each(averages),
-            "escalated": Each(lambda row: False),
+            "v_minus": LazyRows(lambda row: free[row].v),
+            "averages": LazyRows(make_averages),
+            "escalated": LazyRows(lambda row: False),
         }
         for row, run in enumerate(self._runs):
             run.waiting.append((dt, RowReport(parts=parts, row=row)))
 
-    def _apply_impact(self, rows: State, free: Each, dt: float) -> tuple[State, Each]:
+    def _apply_impact(self, rows: State, free: LazyRows, dt: float) -> tuple[State, LazyRows]:
         """Return the states after the impact law, as rows and one by one.
 
         They are as they were where nothing was struck.
@@ -333,14 +339,15 @@ class Group:
             struck = (freeze(new.v) != rows.v).any(axis=1)
             problems = self._problems
 
-            def own_state(row: int) -> State:
+            def split_state(row: int) -> State:
+                """Return the state of one run, with its velocities after the impact."""
                 if not struck[row]:
                     return free[row]
                 v = new.v[row]
                 problems[row].equations.know_rows(problem.equations, row, ("M", v, new.v))
                 return free[row].with_velocity(v)
 
-            return new, Each(own_state)
+            return new, LazyRows(split_state)
 
         # Else run by run, where a point is closed.
         states = []
@@ -349,4 +356,4 @@ class Group:
             if closed[row].any():
                 state = after_impact(own_problem, scheme, old[row], state, dt)
             states.append(state)
-        return replace(join_states(states), u=rows.u), Each(states.__getitem__)
+        return replace(join_states(states), u=rows.u), LazyRows(states.__getitem__)

@@ -26,7 +26,7 @@ _UNITS = {"": ((60,), (60, 1), (3600, 60, 1)), "-": ((3600,), (3600, 60), (3600,
 _IMPORTED = time.monotonic()
 
 
-def seconds_of(wall_time: object) -> float:
+def parse_wall_time(wall_time: object) -> float:
     """Return the seconds of a text that Slurm reads as --time; InputError for any other."""
     text = wall_time if isinstance(wall_time, str) else ""
     match = re.fullmatch(r"(?:(\d+)(-))?(\d+(?::\d+){0,2})", text, re.ASCII)
@@ -40,16 +40,16 @@ def seconds_of(wall_time: object) -> float:
     raise InputError(f"the wall time is {quote(wall_time)}: give {_FORMS}, such as '11:30:00'")
 
 
-def age() -> float:
+def measure_age() -> float:
     """Return the seconds since this process began.
 
     Where the system does not tell, it is since this module was imported.
     """
-    return time.monotonic() - _born()
+    return time.monotonic() - _find_birth()
 
 
 @cache
-def _born() -> float:
+def _find_birth() -> float:
     """Return when this process began, on the clock of ``time.monotonic`` [s]."""
     try:
         ticks = int(Path("/proc/self/stat").read_text().rpartition(")")[2].split()[19])
@@ -69,7 +69,7 @@ class WallTime:
     def __init__(self, wall_time: str | None = None, runs: int = 1) -> None:
         self.text = wall_time
         self._runs = runs
-        self._end = math.inf if wall_time is None else seconds_of(wall_time)
+        self._end = math.inf if wall_time is None else parse_wall_time(wall_time)
         self._last = 0.0  # age of the process at the end of the last step [s]
         self._step = 0.0  # the longest step so far [s]
         self._saving = math.nan  # the longest checkpoint so far [s]
@@ -77,7 +77,7 @@ class WallTime:
     @property
     def left(self) -> float:
         """Return how much of the wall time is left [s]."""
-        return self._end - age()
+        return self._end - measure_age()
 
     @property
     def words(self) -> str:
@@ -96,21 +96,23 @@ class WallTime:
 
     def begin(self) -> None:
         """Note that the first step begins now."""
-        self._last = age()
+        self._last = measure_age()
 
     @contextmanager
     def saving(self) -> Iterator[None]:
         """Take the time of a checkpoint."""
-        begin = age()
+        begin = measure_age()
         yield
-        seconds = age() - begin
+        seconds = measure_age() - begin
         self._saving = seconds if self._never_saved else max(seconds, self._saving)
 
     def over(self) -> bool:
         """Say, at the end of a base step, whether another one might not end in time."""
         if self.text is None:
             return False
-        now = age()
+        # What is still to come takes as long as the longest so far: another step and, for each run,
+        # a checkpoint and the histories. NaN, before the first checkpoint, is not over.
+        now = measure_age()
         self._step = max(self._step, now - self._last)
         self._last = now
         return bool(self._end - now <= SAFETY * (self._step + 2.0 * self._runs * self._saving))

@@ -79,12 +79,12 @@ class CertifiedSolver:
         """Return the solver that is tried first."""
         return self._get(0)
 
-    def _get(self, rank: int) -> PreparedSolver:
-        """Return the solver of that rank of escalation, prepared when first needed."""
-        if rank not in self._prepared:
-            prepare = report_time("preparing")(self._solvers[rank].prepare)
-            self._prepared[rank] = prepare(self._A, self._surface, self._scale)
-        return self._prepared[rank]
+    def _get(self, place: int) -> PreparedSolver:
+        """Return the solver at a place in the list of methods, prepared when first needed."""
+        if place not in self._prepared:
+            prepare = report_time("preparing")(self._solvers[place].prepare)
+            self._prepared[place] = prepare(self._A, self._surface, self._scale)
+        return self._prepared[place]
 
     def solve(self, step: StepProblem) -> tuple[StepResult, Certificate, bool]:
         """Return the first answer whose certificate is below the tolerance. Collective.
@@ -95,26 +95,27 @@ class CertifiedSolver:
         Raises:
             StepFailure: no method has such an answer; the error says what each one gave.
         """
+        # One method after another, until an answer has a certificate.
         refuse_nan(step, lambda: self._problem.equations)
         failures = []
-        for rank, solver in enumerate(self._solvers):
+        for place, solver in enumerate(self._solvers):
             try:
                 with together_if_own(self._surface.comm, solver):
-                    result = self._get(rank).solve(step)
+                    result = self._get(place).solve(step)
             except StepFailure as failure:
                 failures.append(str(failure))
                 continue
-            freeze(result.x)
+            freeze(result.x)  # products with it are remembered, and have to stay true
             certificate = kkt_residual(step, result)
 
             # Round-off that comes near the tolerance is corrected; larger residuals have causes
             # that no correction removes, and no solver is asked for more than it aims at.
             goal = NEAR * self._tolerance
             if max(goal, result.aim) < certificate.worst < FAR:
-                solve = self._get(rank).solve
+                solve = self._get(place).solve
                 result, certificate = correct(step, result, certificate, solve, goal)
             if certificate.worst <= self._tolerance:
-                return result, certificate, rank > 0
+                return result, certificate, place > 0
             failures.append(f"{result.method}: {certificate}")
         raise StepFailure(
             f"step {step.k} at t = {step.t:.6g} s stayed above the certificate tolerance "

@@ -165,6 +165,9 @@ class PreparedCondensed:
         """Return A condensed, with the compliance of the support in its flexibility."""
         surface = self._surface
         condensed = condense(self._A, surface, frictional=frictional)
+
+        # A spring is in series with the body: its compliance adds to the flexibility of its normal
+        # unknown. Contact unknowns stand condition by condition, the normal one first.
         compliance = surface.everywhere(surface.compliance) / self._scale
         unknowns_of_a_condition = len(condensed.movable) // max(surface.total, 1)
         normal = np.arange(surface.total) * unknowns_of_a_condition
@@ -192,15 +195,20 @@ class PreparedCondensed:
             return self.friction.solve(step, self._rigid)
         condensed, small = self._condense_normal()
 
-        # Every rank solves the whole small problem.
+        # Every rank solves the whole small problem, of the conditions of all ranks, so that nothing
+        # is sent afterwards: all of them get the same r.
         bound = step.bound
         guess = step.active
         if surface.comm.size > 1:
             bound, guess = surface.everywhere(np.column_stack([bound, guess])).T
             guess = guess > 0.0
-        answer: LCPResult = small.solve(bound - condensed.find_free_motion(step.b), guess)
 
-        # Closed conditions on a rigid support go exactly onto their bound.
+        # Forward substitution: Eᵀx_free; then q = bound - Eᵀx_free and the small problem.
+        x_free = condensed.find_free_motion(step.b)  # keeps b for ``answer``
+        answer: LCPResult = small.solve(bound - x_free, guess)
+
+        # Backward substitution: x = A⁻¹(b - E r). Closed conditions on a rigid support go exactly
+        # onto their bound, where they are but for rounding.
         x = condensed.answer(answer.r, (answer.r != 0.0) & self._rigid, bound)
         return StepResult(
             x,
@@ -211,7 +219,7 @@ class PreparedCondensed:
         )
 
     def solve_many(self, many: StepProblem, own: Callable[[int], StepProblem]) -> Answers | None:
-        """Return the answers to several steps of this A.
+        """Return the answers to several steps of this A, which reads its factor once for all.
 
         Args:
             many: the steps; its arrays have a row for each.
@@ -219,7 +227,8 @@ class PreparedCondensed:
 
         Returns:
             The answers; None where this cannot be: on several ranks, without contact unknowns last
-            in the factor, and with other methods than ActiveSet.
+            in the factor, and with other methods than ActiveSet. The steps are then solved one by
+            one.
         """
         has_friction = many.slip0 is not None and self._surface.total > 0
         if has_friction:
@@ -232,6 +241,8 @@ class PreparedCondensed:
             return self.friction.solve_many(many, own, self._rigid)
         if not isinstance(small, PreparedSets):
             return None
+
+        # The same as in ``solve``, with a row for each step.
         gaps = many.bound - condensed.find_free_motion(many.b)
         r, active, counts, failed = small.solve_many(gaps, many.active)
         x = freeze(condensed.answer(r, (r != 0.0) & self._rigid, many.bound))

@@ -67,7 +67,7 @@ class Share:
         return self if law is self.law else Share(law, self.share)
 
 
-def share_of(residual: float) -> float:
+def choose_share(residual: float) -> float:
     """Return the share of reactions that an answer with this residual gives back.
 
     It is a power of two, so that no digit is lost.
@@ -76,7 +76,7 @@ def share_of(residual: float) -> float:
     return float(np.clip(np.exp2(power), LEAST, 1.0))
 
 
-def left_over(step: StepProblem, answer: StepResult, share: float) -> StepProblem:
+def pose_remainder(step: StepProblem, answer: StepResult, share: float) -> StepProblem:
     """Return the step for d and q of the head of this file.
 
     Args:
@@ -86,7 +86,7 @@ def left_over(step: StepProblem, answer: StepResult, share: float) -> StepProble
     """
     surface = step.surface
     x = answer.x
-    r_n, r_t = kept_reactions(step, answer, share)
+    r_n, r_t = keep_reactions(step, answer, share)
     friction = step.friction
     slip0 = None
     if step.slip0 is not None:
@@ -110,10 +110,10 @@ def add(step: StepProblem, answer: StepResult, rest: StepResult, share: float) -
     Args:
         step: the step of the answer.
         answer: what left something over.
-        rest: d and q, the answer to ``left_over`` with the same share.
+        rest: d and q, the answer to ``pose_remainder`` with the same share.
         share: s.
     """
-    r_n, r_t = kept_reactions(step, answer, share)
+    r_n, r_t = keep_reactions(step, answer, share)
     if rest.r_t is not None:
         r_t = rest.r_t if r_t is None else r_t + rest.r_t
     return replace(
@@ -125,7 +125,7 @@ def add(step: StepProblem, answer: StepResult, rest: StepResult, share: float) -
     )
 
 
-def kept_reactions(
+def keep_reactions(
     step: StepProblem, answer: StepResult, share: float
 ) -> tuple[Array, Array | None]:
     """Return 1 - s times the reactions, which corrections keep.
@@ -173,9 +173,9 @@ def correct(
     """
     for _ in range(ROUNDS):
         before = certificate.worst
-        share = share_of(before)
+        share = choose_share(before)
         try:
-            rest = solve(left_over(step, result, share))
+            rest = solve(pose_remainder(step, result, share))
         except StepFailure:
             break
         better = add(step, result, rest, share)

@@ -192,13 +192,13 @@ def _run(options: argparse.Namespace) -> str:
     """Carry out ``vi-contact run``: return the summary on the first rank. Collective."""
     import mpi4py.MPI  # noqa: F401  # first: ``world`` finds it
 
-    from ...run.wall_time import seconds_of
+    from ...run.wall_time import parse_wall_time
 
     comm = world()
     path = locate(options.case)
     timing.show_on_terminal(not options.quiet)
     if options.wall_time is not None:
-        seconds_of(options.wall_time)
+        parse_wall_time(options.wall_time)
     if options.steps is not None and options.steps < 1:
         raise InputError(f"--steps {options.steps}: give at least one step")
     case = _read_case(options, path)

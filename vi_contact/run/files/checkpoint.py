@@ -2,11 +2,19 @@
 
 They hold the state of a run in numbers that do not depend on the ranks that go on with it.
 
-``checkpoint.npz`` holds t, k, u, v, the reactions, active and the scheme's memory, vectors in the
-order of ``space.ids`` (the rotated basis has the same numbers as the system's own), the base steps
-done, what problem it is of (``identity``), checksums of the histories and of itself, and the number
-of its format. It is of the end of a base step, never inside a halved one, so that a restart takes
-the steps of the straight run, and always replaced as a whole.
+``checkpoint.npz`` holds these arrays:
+
+- ``u``, ``v`` and vectors of the scheme's memory (``memory_…``), (n of all ranks,), in the order of
+  ``space.ids`` (the rotated basis has the same numbers as the system's own);
+- ``r_n``, ``active`` and with friction ``r_t``, a row for each condition of all ranks, in the order
+  of ``surface.slots``;
+- other arrays of the memory, which are the same on every rank;
+- ``about``, a text in JSON: t, k, the base steps done, what problem it is of (``identify``), the
+  checksum of the histories, and the number of the format;
+- ``compute_checksum``, of all the others.
+
+It is of the end of a base step, never inside a halved one, so that a restart takes the steps of the
+straight run, and always replaced as a whole. Only rank 0 touches the file (``on_root``).
 """
 
 import hashlib
@@ -36,13 +44,14 @@ from ...core.problem import ContactProblem
 from ...core.step import Scheme, State
 from ..time_steps import TimeSteps
 from .folder import CHECKPOINT, FORMAT, check_format
-from .identity import FIXED, differences, identity
+from .identity import FIXED, find_differences, identify
 
 log = logging.getLogger(__name__)
 Arrays = dict[str, Any]
-MEMORY = "memory_"
+MEMORY = "memory_"  # how names of arrays of the scheme's memory begin
 CONTACT = ("r_n", "active", "r_t")  # arrays of the conditions
 LONGEST = 200  # characters of a foreign reason
+# what a damaged archive makes the readers of zip, numpy and json raise
 DAMAGE = (
     OSError,
     ValueError,
@@ -58,7 +67,6 @@ DAMAGE = (
     zlib.error,
     zipfile.BadZipFile,
 )
-"""What a damaged archive makes the readers of zip, numpy and json raise."""
 
 
 @dataclass(frozen=True)
@@ -101,15 +109,16 @@ def write_checkpoint(
         folder: of the run.
         problem: what is marched.
         place: where it is left.
-        run_of: the "run", as ``identity`` sees it over a "span" of times [s].
+        run_of: the "run", as ``identify`` sees it over a "span" of times [s].
         rows: checksum of the histories up to here.
         safe: whether these are on the medium, and the checkpoint shall be.
 
     Raises:
         ViContactError: on all ranks, when the disk refuses it.
     """
+    # Rank 0 gets the vectors of all ranks, with the numbers of their unknowns, and whole arrays.
     state = place.state
-    vectors, same = _split(problem, state)
+    vectors, arrays_of_root = _split(problem, state)
     gathered = problem.system.algebra.comm.gather((problem.system.space.ids, vectors))
     # json keeps floats to the last bit
     about = json.dumps(
@@ -128,22 +137,23 @@ def write_checkpoint(
     )
 
     def write() -> None:
+        """Write the file, on rank 0."""
         # Vectors of all ranks, in the order of the numbers of their unknowns: another number of
         # ranks finds its own there.
         parts = gathered or []
         order = np.argsort(np.concatenate([ids for ids, _ in parts]))
-        arrays = dict(same)
+        arrays = dict(arrays_of_root)
         for name in vectors:
             arrays[name] = np.concatenate([own[name] for _, own in parts])[order]
         arrays["about"] = np.array(about)
         buffer = io.BytesIO()
-        np.savez(buffer, checksum=np.array(checksum(arrays)), **arrays)
+        np.savez(buffer, checksum=np.array(compute_checksum(arrays)), **arrays)
         write_atomically(folder / CHECKPOINT, buffer.getvalue(), safe=safe)
 
     on_root(problem.system.algebra.comm, write)
 
 
-def checksum(arrays: Mapping[str, Any]) -> str:
+def compute_checksum(arrays: Mapping[str, Any]) -> str:
     """Return the checksum of names, types, shapes and values."""
     digest = hashlib.sha256()
     for name, values in sorted(arrays.items()):
@@ -153,24 +163,31 @@ def checksum(arrays: Mapping[str, Any]) -> str:
     return digest.hexdigest()
 
 
-def state_checksum(folder: Path) -> str:
+def read_state_checksum(folder: Path) -> str:
     """Return the checksum of the state that the checkpoint in a folder holds."""
-    return checksum(_unpack(folder / CHECKPOINT)[1])
+    return compute_checksum(_unpack(folder / CHECKPOINT)[1])
 
 
 def _split(problem: ContactProblem, state: State) -> tuple[Arrays, Arrays]:
-    """Return (arrays of the unknowns of this rank, arrays that are whole on rank 0). Collective."""
+    """Return the arrays of a state in two kinds. Collective.
+
+    Returns:
+        Those with an entry for each unknown of this rank: u, v, vectors of the memory; and those
+        that are whole on rank 0: of the contact conditions, and the rest of the memory.
+    """
     comm = problem.system.algebra.comm
     vectors: Arrays = {"u": state.u, "v": state.v}
     contact: Arrays = {"r_n": state.r_n, "active": state.active}
     if state.r_t is not None:
         contact["r_t"] = state.r_t
-    same = {name: problem.surface.on_first(array) for name, array in contact.items()}
+    whole = {name: problem.surface.on_first(values) for name, values in contact.items()}
     for name in sorted(state.memory):
-        array = np.asarray(state.memory[name])
-        kind = same if largest(comm, array.shape != state.u.shape) else vectors
-        kind[f"{MEMORY}{name}"] = array
-    return vectors, same
+        values = np.asarray(state.memory[name])
+        # On one rank alone an array may have as many entries as there are unknowns by chance.
+        is_whole = largest(comm, values.shape != state.u.shape)
+        kind = whole if is_whole else vectors
+        kind[f"{MEMORY}{name}"] = values
+    return vectors, whole
 
 
 def read_checkpoint(
@@ -192,18 +209,19 @@ def read_checkpoint(
         InputError: the checkpoint is missing, damaged, of an unknown format, or of another problem,
             dt (or plan of them) or scheme.
     """
+    # Rank 0 reads the file, and all ranks hear what it is of.
     file = folder / CHECKPOINT
     comm = problem.system.algebra.comm
-    about_and_arrays = on_root(comm, lambda: _read(file, problem))
-    about = comm.bcast(None if about_and_arrays is None else about_and_arrays[0])
-    whole = None if about_and_arrays is None else about_and_arrays[1]
-    other = _compare(file, problem, scheme, dt, about, changed)
-    arrays: Arrays = {"r_t": None} | _own_rows(problem, about["vectors"], whole)
+    content = on_root(comm, lambda: _read(file, problem))  # None on the other ranks
+    about, whole = (None, None) if content is None else content
+    about = comm.bcast(about)
+    changes = _compare(file, problem, scheme, dt, about, changed)
+    arrays: Arrays = {"r_t": None} | _send_rows(problem, about["vectors"], whole)
 
     # What a scheme keeps in mind was made of the matrices and loads of its own problem.
     memory = {}
     for name, values in arrays.items():
-        if name.startswith(MEMORY) and not other:
+        if name.startswith(MEMORY) and not changes:
             memory[name.removeprefix(MEMORY)] = values
     state = State(
         about["t"],
@@ -212,15 +230,15 @@ def read_checkpoint(
         **{name: arrays[name] for name in ("u", "v", *CONTACT)},
     )
     place = RestartPoint(state, about["t_start"], about["k_start"], about["base"], about["halved"])
-    if "dt" in other:
+    if "dt" in changes:  # steps of another length are counted from here
         place = replace(place, t_start=state.t, k_start=place.number, base=0)
     return place, about["rows"]
 
 
-def _own_rows(problem: ContactProblem, vectors: list[str], whole: Arrays | None) -> Arrays:
-    """Return this rank's rows of arrays that rank 0 has as a whole; they are sent rank by rank.
+def _send_rows(problem: ContactProblem, vectors: list[str], whole: Arrays | None) -> Arrays:
+    """Return this rank's rows of arrays that rank 0 has as a whole. Collective.
 
-    Collective.
+    They are sent in one message for each rank, so that rank 0 alone holds the whole.
 
     Args:
         problem: whose unknowns and conditions the ranks have.
@@ -233,6 +251,7 @@ def _own_rows(problem: ContactProblem, vectors: list[str], whole: Arrays | None)
     all_ids = np.sort(np.concatenate([ids for ids, _ in parts]))
     own: Arrays = {}
     for rank, (ids, slots) in enumerate(parts):
+        # Which rows this rank has of each array; ... takes all of those that ranks have alike.
         rows = dict.fromkeys(vectors, np.searchsorted(all_ids, ids))
         rows |= dict.fromkeys(CONTACT, slots)
         message = {name: values[rows.get(name, ...)] for name, values in (whole or {}).items()}
@@ -250,7 +269,7 @@ def _compare(
     about: Mapping[str, Any],
     changed: bool,
 ) -> list[str]:
-    """Return the names of what the checkpoint has otherwise than this run. Collective.
+    """Return the names of what differs between the checkpoint's run and this one. Collective.
 
     Args:
         file: the checkpoint.
@@ -264,7 +283,7 @@ def _compare(
         InputError: there are differences that are not allowed, or that cannot be.
     """
     start, end = about["span"]
-    changes = differences(identity(problem, scheme, dt, start=start, end=end), about["run"])
+    changes = find_differences(identify(problem, scheme, dt, start=start, end=end), about["run"])
     for name, how in changes.items():
         if name in FIXED or not changed:
             remedy = "or start a new one"
@@ -280,7 +299,7 @@ def _compare(
     return list(changes)
 
 
-def _error_of_damage(file: Path, why: Any) -> InputError:
+def _describe_damage(file: Path, why: Any) -> InputError:
     """Return the error about a checkpoint that cannot be read, with a reason on one line."""
     reason = " ".join(str(why).split())[:LONGEST]  # zipfile puts half the file into its words
     return InputError(f"the checkpoint '{file}' is damaged ({reason}): start a new run")
@@ -297,14 +316,14 @@ def _read(file: Path, problem: ContactProblem) -> tuple[dict[str, Any], Arrays]:
     except DAMAGE as error:
         if is_of_machine(error):
             raise
-        raise _error_of_damage(file, str(error) or type(error).__name__) from error
+        raise _describe_damage(file, str(error) or type(error).__name__) from error
     check_format(file, about.get("format"))
     try:
         _check_sizes(problem, about, arrays)
     except KeyError as error:
-        raise _error_of_damage(file, f"{error} is missing") from error
+        raise _describe_damage(file, f"{error} is missing") from error
     except (InputError, TypeError) as error:
-        raise _error_of_damage(file, error) from error
+        raise _describe_damage(file, error) from error
     return about, arrays
 
 
@@ -325,7 +344,7 @@ def _unpack(file: Path) -> tuple[dict[str, Any], Arrays]:
     about = json.loads(str(arrays["about"]))
     if not isinstance(about, dict) or not isinstance(about.get("run"), dict):
         raise ValueError("the description of the run is missing")
-    if str(announced) != checksum(arrays):
+    if str(announced) != compute_checksum(arrays):
         raise ValueError("its checksum is wrong")
     del arrays["about"]
     return about, arrays
@@ -336,9 +355,9 @@ def _check_header(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> None:
 
     This is done before memory is taken.
     """
+    readers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
     with archive.open(member) as file:
-        version = npy.read_magic(file)
-        read = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}.get(version)
+        read = readers.get(npy.read_magic(file))
         if read is None:
             raise ValueError(f"{member.filename} has a header of an unknown version")
         shape, _, kind = read(file)

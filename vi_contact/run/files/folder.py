@@ -54,21 +54,21 @@ log = logging.getLogger(__name__)
 FIRST = b"t,k,iterations,certificate,escalated"  # how every history.csv begins
 FORMAT = 1  # of run folders and checkpoints
 
-ABOUT = "format.json"
+ABOUT = "format.json"  # the mark by which a folder belongs to runs
 CHECKPOINT = "checkpoint.npz"
-COLUMNS = "columns.json"
-COPY = "case.toml"
-FOLLOWS = "follows.txt"
-HISTORY_CSV = "history.csv"
-HISTORY_H5 = "history.h5"
-JOURNAL = "history.journal"
+COLUMNS = "columns.json"  # units and meanings of the columns of the histories
+COPY = "case.toml"  # the case file that a run was made of
+FOLLOWS = "follows.txt"  # in a stage: which stage it begins with
+HISTORY_CSV = "history.csv"  # numbers, a row for each step
+HISTORY_H5 = "history.h5"  # numbers and arrays, up to the last save
+JOURNAL = "history.journal"  # arrays of the rows since then
 LOCK = ".lock"
 LOG = "run.log"
-MESH = "mesh.h5"
+MESH = "mesh.h5"  # in the folder of fields
 STAGES = "stages"  # the folder of the runs of stages before the last one
-MODEL = "model.json"
+MODEL = "model.json"  # a description of the model
 SUMMARY = "summary.json"
-# of a run
+# the files of a run
 FILES = (
     ABOUT,
     CHECKPOINT,
@@ -81,8 +81,9 @@ FILES = (
     MODEL,
     SUMMARY,
 )
-# beside them, by cases and studies
+# beside them, written by cases and studies,
 _OF_CASES = (COPY, FOLLOWS, "strain_compatible.json", "row.json", "failure.txt")
+# and by reports
 _OF_REPORTS = (
     "report.pdf",
     "report.html",
@@ -94,7 +95,7 @@ _OF_REPORTS = (
     "film.mp4",
 )
 _TRIAL = re.compile(r"\.writable-\d+")
-_held: dict[Path, int] = {}  # locks that this process has -> the thread that took them
+_locks: dict[Path, int] = {}  # lock files that this process holds -> the thread that took each
 
 
 def run_folder(comm: Comm, path: str | Path) -> Path:
@@ -113,6 +114,7 @@ def run_folder(comm: Comm, path: str | Path) -> Path:
         )
 
     def make() -> None:
+        """Make the folder on rank 0, write a file into it, and remove that."""
         try:
             folder.mkdir(parents=True, exist_ok=True)
             trial = folder / f".writable-{os.getpid()}"
@@ -146,7 +148,7 @@ def refuse_files_of_others(folder: Path) -> None:
     """Raise InputError for a file that a run would replace, in a folder that no run has taken."""
     if is_marked(folder):
         return
-    for path in _written_by_runs(folder):
+    for path in _list_replaced(folder):
         raise InputError(
             f"'{path}' is not of a run of vi_contact (there is no {ABOUT} in '{folder}'), and a "
             "run would replace it: choose another output folder, or move the file"
@@ -164,18 +166,17 @@ def take(folder: Path) -> None:
     write_atomically(folder / ABOUT, (to_json(about) + "\n").encode())
 
 
-def _written_by_runs(folder: Path) -> list[Path]:
-    """Return what is in a folder under names that runs write.
+def _list_replaced(folder: Path) -> list[Path]:
+    """Return the files in a folder that have names which a run would write.
 
-    It leaves out the copy of a case, which has a mark of its own.
+    A description that ``vi-contact run --check`` wrote is no file of others. The copy of a case is
+    left out, as it has a mark of its own.
     """
-    fields = inner_folder(folder, FIELDS)
-    files = [
-        folder / name
-        for name in (*FILES, FOLLOWS)
-        if name != MODEL or not _is_model(folder / MODEL)
-    ]
-    return [path for path in [*files, *_frames(fields)] if os.path.lexists(path)]
+    paths = [folder / name for name in (*FILES, FOLLOWS)]
+    if _is_model(folder / MODEL):
+        paths.remove(folder / MODEL)
+    paths += _list_frames(inner_folder(folder, FIELDS))
+    return [path for path in paths if os.path.lexists(path)]
 
 
 def _is_model(path: Path) -> bool:
@@ -192,7 +193,7 @@ def _is_model(path: Path) -> bool:
     return isinstance(content, dict) and {"title", "dimension", "unknowns"} <= set(content)
 
 
-def _frames(fields: Path) -> list[Path]:
+def _list_frames(fields: Path) -> list[Path]:
     """Return the files in the folder of fields that have names of ours."""
     names_there = sorted(os.listdir(fields)) if fields.is_dir() else []
     return [fields / name for name in names_there if _is_frame(name)]
@@ -241,7 +242,7 @@ def clear(folder: Path) -> None:
         return
     for name in (CHECKPOINT, JOURNAL, HISTORY_H5, SUMMARY, FIELDS_INDEX):
         remove(folder / name)
-    for frame in _frames(inner_folder(folder, FIELDS)):
+    for frame in _list_frames(inner_folder(folder, FIELDS)):
         remove(frame)
 
 
@@ -254,9 +255,9 @@ def remove_run(folder: Path) -> None:
         return
     fields = inner_folder(folder, FIELDS)
     stages = inner_folder(folder, STAGES)
-    for stage in _folders_inside(stages):
+    for stage in _list_folders(stages):
         remove_run(stage)
-    for frame in _frames(fields):
+    for frame in _list_frames(fields):
         remove(frame)
     remove_litter(folder)
     for name in (*FILES, *_OF_CASES, *_OF_REPORTS, LOCK):
@@ -274,9 +275,9 @@ def move_run(folder: Path, target: Path) -> None:
     """
     fields = inner_folder(folder, FIELDS)
     stages = inner_folder(folder, STAGES)
-    for stage in filter(is_marked, _folders_inside(stages)):
+    for stage in filter(is_marked, _list_folders(stages)):
         os.replace(stage, make_inner_folder(target, STAGES) / stage.name)
-    for frame in _frames(fields):
+    for frame in _list_frames(fields):
         os.replace(frame, make_inner_folder(target, FIELDS) / frame.name)
     others = [name for name in (*FILES, *_OF_CASES, *_OF_REPORTS) if name != ABOUT]
     for name in (*others, ABOUT):  # last: what an interruption leaves is still known as a run's
@@ -286,7 +287,7 @@ def move_run(folder: Path, target: Path) -> None:
         remove_if_empty(place)
 
 
-def _folders_inside(folder: Path) -> list[Path]:
+def _list_folders(folder: Path) -> list[Path]:
     """Return the folders inside a folder; no links."""
     if not folder.is_dir():
         return []
@@ -348,7 +349,7 @@ def lock_folder(comm: Comm, folder: Path | None, name: str = LOCK) -> Iterator[N
     finally:
         # removed while locked: who opens it meanwhile makes a new one
         if mine is not None and folder is not None:
-            _held.pop(folder.resolve() / name, None)
+            _locks.pop(folder.resolve() / name, None)
             remove(folder / name)
             mine.close()
 
@@ -358,7 +359,7 @@ def _take(folder: Path, name: str) -> Any:
 
     A file that was removed between opening and locking it holds nobody off: it is tried again.
     """
-    if _held.get(folder.resolve() / name) == threading.get_ident():
+    if _locks.get(folder.resolve() / name) == threading.get_ident():
         return None
     while True:
         file = open_lock(folder / name)
@@ -366,8 +367,8 @@ def _take(folder: Path, name: str) -> Any:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise InputError(
-                f"another run writes into '{folder}' ({_owner(file)}): wait until it has ended, or "
-                "choose another output folder"
+                f"another run writes into '{folder}' ({_read_owner(file)}): wait until it has "
+                "ended, or choose another output folder"
             ) from None
         except OSError as error:
             log.warning(
@@ -383,11 +384,11 @@ def _take(folder: Path, name: str) -> Any:
         file.close()  # it has been removed since, by the run that had it
     file.truncate(0)
     file.write(f"process {os.getpid()} on {socket.gethostname()}".encode())
-    _held[folder.resolve() / name] = threading.get_ident()
+    _locks[folder.resolve() / name] = threading.get_ident()
     return file
 
 
-def _owner(file: Any) -> str:
+def _read_owner(file: Any) -> str:
     """Return who holds the lock, as it wrote into the file, and close the file."""
     with file:
         file.seek(0)

@@ -35,7 +35,7 @@ from ...core.files import (
 from ...core.own_files import open_new, open_to_append, open_to_read, remove
 from ...core.step import Row
 from .folder import COLUMNS, FORMAT, HISTORY_CSV, HISTORY_H5, JOURNAL
-from .stored_rows import StoredArrays, StoredRows, lines_of, read_blocks, records_of
+from .stored_rows import StoredArrays, StoredRows, pack_records, read_blocks, write_lines
 from .table import Block, Table
 
 # of contact points, units
@@ -116,11 +116,11 @@ class HistoryFiles:
 
     def append(self, *rows: Row) -> None:
         """Write rows onto the disk; those that it has no room for are taken back, all of them."""
-        lines = lines_of(self._table, rows)
+        lines = write_lines(self._table, rows)
         block = {}
         for name in ("k", *self._table.arrays):
             block[name] = np.array([row[name] for row in rows])
-        records = records_of(self._table, block)
+        records = pack_records(self._table, block)
         _append((self._journal, b"".join(records)), (self._csv, b"".join(lines)))
         for line, record in zip(lines, records, strict=True):
             self._hash.update(line + record)

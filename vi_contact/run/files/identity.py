@@ -23,7 +23,7 @@ from ...core.problem import ContactProblem, replace_tuples
 from ...core.step import Scheme
 from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem, evaluate_history
-from ..time_steps import TimeSteps, number_or_words, pieces_of
+from ..time_steps import TimeSteps, describe_plan, list_pieces
 
 ROUND_OFF = 1e-6  # of coordinates: SAME of it is a hundred times the last digit of a gap
 # relative difference of numbers that count as equal: above round-off, below what anybody means to
@@ -44,7 +44,7 @@ Numbers = list[tuple[float, float]]  # values and their sizes
 Identity = dict[str, Any]
 
 
-def identity(
+def identify(
     problem: ContactProblem, scheme: Scheme, dt: TimeSteps, *, start: float, end: float
 ) -> Identity:
     """Return name -> number, text or numbers with sizes, of all ranks. Collective.
@@ -67,31 +67,33 @@ def identity(
 
     # Times: of loads that may have to be marched to in the first steps only, of histories all over
     # the run, one in each SAMPLES-th of it, at unequal distances.
-    first = min(end - start, STEPS * min(pieces_of(dt))[0])
+    first = min(end - start, STEPS * min(list_pieces(dt))[0])
     early = [start + first * i / EARLY for i in range(EARLY + 1)]
     places = np.arange(SAMPLES)
     times = start + (end - start) * (places + probe(places, 0) + 0.5) / SAMPLES
-    friction = replace_tuples(problem.friction, surface, partial(_of_all_points, surface))
+    friction = replace_tuples(problem.friction, surface, partial(_gather_values, surface))
     return {
         "unknowns": system.space.unknowns,
         "contact points": surface.total,
-        "dt": number_or_words(dt),
-        "scheme": text_of(scheme),
-        "mass": text_of(problem.mass),
-        "impact law": text_of(problem.impact),
-        "friction law": text_of(friction),
-        "stiffness": [_dot(system, w, system.K @ x) for w, x in pairs],
-        "mass matrix": [_dot(system, w, system.M @ x) for w, x in pairs],
-        "damping": [] if system.C is None else [_dot(system, w, system.C @ x) for w, x in pairs],
-        "geometry": [_dot(system, probes[0], x) for x in system.space.coordinates.T],
-        "load": _loads(system, probes, early, times),
-        "excitation": _excitation(problem, times),
-        "contact surface or obstacle": _contact(surface, early),
-        "friction": _friction(problem),
+        "dt": describe_plan(dt),
+        "scheme": write_as_text(scheme),
+        "mass": write_as_text(problem.mass),
+        "impact law": write_as_text(problem.impact),
+        "friction law": write_as_text(friction),
+        "stiffness": [_multiply(system, w, system.K @ x) for w, x in pairs],
+        "mass matrix": [_multiply(system, w, system.M @ x) for w, x in pairs],
+        "damping": []
+        if system.C is None
+        else [_multiply(system, w, system.C @ x) for w, x in pairs],
+        "geometry": [_multiply(system, probes[0], x) for x in system.space.coordinates.T],
+        "load": _describe_loads(system, probes, early, times),
+        "excitation": _describe_excitation(problem, times),
+        "contact surface or obstacle": _describe_contact(surface, early),
+        "friction": _describe_friction(problem),
     }
 
 
-def text_of(value: Any) -> str:
+def write_as_text(value: Any) -> str:
     """Return the repr of a law without addresses.
 
     What releases of numpy write differently is left out too.
@@ -99,20 +101,20 @@ def text_of(value: Any) -> str:
     return _NUMPY.sub(r"\1", _ADDRESS.sub("", repr(value)))
 
 
-def differences(ours: Identity, theirs: Mapping[str, Any]) -> dict[str, str]:
+def find_differences(ours: Identity, theirs: Mapping[str, Any]) -> dict[str, str]:
     """Return name -> how, of the facts of theirs that are others in ours."""
     changes: dict[str, str] = {}
     for name, our in ours.items():
         their = theirs.get(name)
         if isinstance(our, list):
-            if not _same_numbers(our, their):
+            if not _agree_in_numbers(our, their):
                 changes[name] = f"another {name}"
-        elif not _same_text(str(our), str(their)):
+        elif not _agree_in_text(str(our), str(their)):
             changes[name] = f"{name} = {str(their)[:SHOWN]} but this one has {str(our)[:SHOWN]}"
     return changes
 
 
-def _same_numbers(ours: Numbers, theirs: Any) -> bool:
+def _agree_in_numbers(ours: Numbers, theirs: Any) -> bool:
     """Say whether values differ by at most SAME of their sizes."""
     try:
         our = np.array(ours, dtype=float).reshape(-1, 2)
@@ -125,7 +127,7 @@ def _same_numbers(ours: Numbers, theirs: Any) -> bool:
     return bool(np.all(np.abs(our - their) <= SAME * size))
 
 
-def _same_text(ours: str, theirs: str) -> bool:
+def _agree_in_text(ours: str, theirs: str) -> bool:
     """Say whether words are the same, and numbers between them to SAME."""
     # words and numbers in turn
     our = _NUMBER.split(ours)
@@ -139,13 +141,13 @@ def _same_text(ours: str, theirs: str) -> bool:
         return False
 
 
-def _dot(system: SemiDiscreteSystem, w: Array, x: Array) -> tuple[float, float]:
+def _multiply(system: SemiDiscreteSystem, w: Array, x: Array) -> tuple[float, float]:
     """Return w·x of vectors (n,) and |w| |x|, the size of it. Collective."""
     dot = system.algebra.dot
     return dot(w, x), float(np.sqrt(dot(w, w) * dot(x, x)))
 
 
-def _loads(
+def _describe_loads(
     system: SemiDiscreteSystem, probes: Sequence[Array], early: Sequence[float], times: Array
 ) -> Numbers:
     """Return the load in the first steps, and the histories of its separable parts. Collective.
@@ -162,42 +164,42 @@ def _loads(
     numbers = [(system.algebra.dot(w, f), size * length) for f in forces for w in probes]
     for vector, history in system.load.separable:
         values = np.array([float(evaluate_history(history, t)) for t in times])
-        numbers += [_dot(system, probes[0], vector), *_sums_of_row(values)]
+        numbers += [_multiply(system, probes[0], vector), *_sum_row(values)]
     return numbers
 
 
-def _sums_of_row(values: Array) -> Numbers:
+def _sum_row(values: Array) -> Numbers:
     """Return sums of a row of numbers, with weights that see each of them."""
-    *sums, size = _sums(values, np.arange(len(values)))
+    *sums, size = _sum_weighted(values, np.arange(len(values)))
     return [(value, size) for value in sums]
 
 
-def _sums(values: Array, places: Indices) -> list[float]:
+def _sum_weighted(values: Array, places: Indices) -> list[float]:
     """Return three sums of numbers with weights of their places, and that of their sizes."""
     values = np.ascontiguousarray(values, dtype=float)
     weights = (np.ones(len(values)), probe(places, 1), probe(places, 2))
     return [*(float(w @ values) for w in weights), float(np.abs(values).sum())]
 
 
-def _excitation(problem: ContactProblem, times: Array) -> Numbers:
+def _describe_excitation(problem: ContactProblem, times: Array) -> Numbers:
     """Return the ground's accelerations at the times, and all numbers of the excitations."""
     if not problem.excitations:
         return []
     ground = np.array([problem.ground_acceleration(float(t)) for t in times])
     columns = list(ground.T)
     for excitation in problem.excitations:
-        columns.append(np.array(list(_numbers_in(excitation))))
-    return [pair for column in columns for pair in _sums_of_row(column)]
+        columns.append(np.array(list(_list_numbers(excitation))))
+    return [pair for column in columns for pair in _sum_row(column)]
 
 
-def _numbers_in(value: Any) -> Iterator[float]:
+def _list_numbers(value: Any) -> Iterator[float]:
     """Return all numbers of a value object.
 
     These are every sample of a record, also those between the times that are looked at.
     """
     if is_dataclass(value):
         for field in fields(value):
-            yield from _numbers_in(getattr(value, field.name))
+            yield from _list_numbers(getattr(value, field.name))
     elif isinstance(value, np.ndarray | tuple | list):
         array = np.asarray(value)
         if array.dtype.kind in "if":
@@ -206,7 +208,7 @@ def _numbers_in(value: Any) -> Iterator[float]:
         yield float(value)
 
 
-def _contact(surface: ContactSurface, early: Sequence[float]) -> Numbers:
+def _describe_contact(surface: ContactSurface, early: Sequence[float]) -> Numbers:
     """Return where contact points are, and what they may touch, at rest and as it moves."""
     arrays = [
         *surface.points.T,
@@ -220,7 +222,7 @@ def _contact(surface: ContactSurface, early: Sequence[float]) -> Numbers:
         arrays += [surface.gap(t) for t in early]
     if surface.slide is not None:
         arrays += [column for t in early for column in surface.slide(t).T]
-    numbers = _columns(surface, arrays)
+    numbers = _sum_columns(surface, arrays)
 
     # Gaps are differences of points, whose round-off they have: their size is at least that. They
     # are the gap at rest, and all that moves; each array gives three numbers.
@@ -233,13 +235,13 @@ def _contact(surface: ContactSurface, early: Sequence[float]) -> Numbers:
     return sized
 
 
-def _columns(surface: ContactSurface, arrays: Sequence[Array]) -> Numbers:
+def _sum_columns(surface: ContactSurface, arrays: Sequence[Array]) -> Numbers:
     """Return sums of values (m,) of the contact conditions of all ranks. Collective."""
-    sums = surface.comm.sum(np.array([_sums(values, surface.slots) for values in arrays]))
+    sums = surface.comm.sum(np.array([_sum_weighted(values, surface.slots) for values in arrays]))
     return [(value, size) for *values, size in sums.tolist() for value in values]
 
 
-def _of_all_points(surface: ContactSurface, values: tuple[Any, ...]) -> tuple[Any, ...]:
+def _gather_values(surface: ContactSurface, values: tuple[Any, ...]) -> tuple[Any, ...]:
     """Return the values of all contact points in place of this rank's."""
     parts = from_each(surface.comm, (surface.slots.tolist(), values))
     if any(len(slots) != len(values) for slots, values in parts):
@@ -248,7 +250,7 @@ def _of_all_points(surface: ContactSurface, values: tuple[Any, ...]) -> tuple[An
     return tuple(value for _, value in sorted(numbered, key=lambda pair: pair[0]))
 
 
-def _friction(problem: ContactProblem) -> Numbers:
+def _describe_friction(problem: ContactProblem) -> Numbers:
     """Return the largest tangential reactions under a pressure, and their slopes.
 
     They are those at several slip rates.
@@ -256,4 +258,4 @@ def _friction(problem: ContactProblem) -> Numbers:
     law = problem.friction
     weights = problem.surface.weights
     rates = [law.at(np.full(len(weights), speed)).slope(weights) for speed in SPEEDS]
-    return _columns(problem.surface, [law.limit(weights, weights, 1.0), *rates])
+    return _sum_columns(problem.surface, [law.limit(weights, weights, 1.0), *rates])

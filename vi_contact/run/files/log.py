@@ -56,7 +56,7 @@ class RunLog:
 
     Warnings go to the terminal too; all this on rank 0.
 
-    While runs take turns (``turn_of``) a line goes to the logs that were opened in this turn. The
+    While runs take turns (``give_turn``) a line goes to the logs that were opened in this turn. The
     root logger is left out: form compilers make it print every line.
     """
 
@@ -81,7 +81,8 @@ class RunLog:
 
     def check(self) -> None:
         """Raise the OSError of a line that could not be written."""
-        if error := self._file.error:
+        error = self._file.error
+        if error is not None:
             raise OSError(error.errno, error.strerror, str(self._file.path))
 
     def close(self) -> None:
@@ -97,7 +98,7 @@ class RunLog:
 
 
 @contextmanager
-def turn_of(run: object) -> Iterator[None]:
+def give_turn(run: object) -> Iterator[None]:
     """Give one of several runs its turn with the logs."""
     RunLog.turn = run
     try:
@@ -106,7 +107,7 @@ def turn_of(run: object) -> Iterator[None]:
         RunLog.turn = None
 
 
-def versions(*needed: str) -> dict[str, str]:
+def list_versions(*needed: str) -> dict[str, str]:
     """Return the version of everything that computes in this process.
 
     What else is needed to write is there too.

@@ -20,7 +20,7 @@ from ...core.files import describe_os_error, open_hdf5
 from ...core.hdf5 import StoredFile
 from ...core.own_files import is_own, open_to_read, read_bytes
 from .folder import COLUMNS, HISTORY_CSV, HISTORY_H5, SUMMARY, check_folder_format
-from .stored_rows import numbers_of
+from .stored_rows import parse_numbers
 
 T = TypeVar("T")
 BYTES = 100_000_000  # of a JSON file
@@ -92,11 +92,11 @@ def read_run(folder: str | Path) -> RunFolder:
     if not is_own(folder / HISTORY_CSV):
         raise InputError(f"'{folder}' has no {HISTORY_CSV}: give the output folder of a run")
     check_folder_format(folder)
-    history = _numbers(folder / HISTORY_CSV)
-    columns = _read_file(folder / COLUMNS, lambda path: _columns(read_object(path), history))
-    facts = _read_file(folder / SUMMARY, _summary)
+    history = _read_numbers(folder / HISTORY_CSV)
+    columns = _read_file(folder / COLUMNS, lambda path: _check_columns(read_object(path), history))
+    facts = _read_file(folder / SUMMARY, _read_summary)
     _check_rows(folder, history, facts)
-    arrays, contact = _read_file(folder / HISTORY_H5, lambda path: _arrays(path, history))
+    arrays, contact = _read_file(folder / HISTORY_H5, lambda path: _read_arrays(path, history))
     return RunFolder(folder, history | arrays, columns, facts, contact)
 
 
@@ -115,11 +115,11 @@ def _read_file(path: Path, read: Callable[[Path], T]) -> T:
         if is_of_machine(error):
             raise
         raise InputError(
-            f"a file of the run, '{path}', is missing or damaged ({_short(error)}): restore it"
+            f"a file of the run, '{path}', is missing or damaged ({_shorten(error)}): restore it"
         ) from error
 
 
-def _short(error: Exception) -> str:
+def _shorten(error: Exception) -> str:
     """Return the reason on one line; that of a damaged table may be as long as the table."""
     return shorten(" ".join(part[:SHOWN] for part in str(error).split()), 200, placeholder=" …")
 
@@ -144,7 +144,9 @@ def read_object(path: Path) -> dict[str, Any]:
     return content
 
 
-def _columns(content: dict[str, Any], history: Mapping[str, Array]) -> dict[str, tuple[str, str]]:
+def _check_columns(
+    content: dict[str, Any], history: Mapping[str, Array]
+) -> dict[str, tuple[str, str]]:
     """Return column -> (unit, meaning) of the content of columns.json, which knows all columns."""
     columns = {name: (about["unit"], about["meaning"]) for name, about in content.items()}
     if not all(isinstance(text, str) for pair in columns.values() for text in pair):
@@ -155,12 +157,12 @@ def _columns(content: dict[str, Any], history: Mapping[str, Array]) -> dict[str,
     return columns
 
 
-def _summary(path: Path) -> dict[str, Any]:
+def _read_summary(path: Path) -> dict[str, Any]:
     """Return the content of summary.json; nothing when there is none yet."""
-    return _facts(read_object(path)) if is_own(path) else {}
+    return _check_facts(read_object(path)) if is_own(path) else {}
 
 
-def _facts(facts: dict[str, Any]) -> dict[str, Any]:
+def _check_facts(facts: dict[str, Any]) -> dict[str, Any]:
     """Return the summary, its entries of the kinds that ``Solution`` writes."""
     for name, kinds in _KINDS.items():
         value = facts.get(name)
@@ -179,17 +181,20 @@ def _fits(value: Any, kinds: type | tuple[type, ...]) -> bool:
     return not isinstance(value, int | float) or abs(value) < 1e300
 
 
-def _numbers(path: Path) -> dict[str, Array]:
+def _read_numbers(path: Path) -> dict[str, Array]:
     """Return the columns of history.csv; a last line that a crash cut short is left out."""
     try:
-        header, *lines = [
-            line for line in read_bytes(path).splitlines(keepends=True) if line.endswith(b"\n")
-        ]
+        whole_lines = []
+        for line in read_bytes(path).splitlines(keepends=True):
+            if line.endswith(b"\n"):
+                whole_lines.append(line)
+        header, *lines = whole_lines
         names = header.decode().strip().split(",")
-        history = dict(zip(names, numbers_of(str(path), lines, len(names), 0).T, strict=True))
+        history = dict(zip(names, parse_numbers(str(path), lines, len(names), 0).T, strict=True))
         if not lines or len(history) != len(names):
             raise ValueError("there are no rows, or two columns have one name")
-        if missing := [name for name in _NEEDED if name not in history]:
+        missing = [name for name in _NEEDED if name not in history]
+        if missing:
             raise ValueError(f"no column {missing[0]}")
         if not np.all(np.isfinite(history["t"])) or np.any(np.diff(history["t"]) <= 0.0):
             raise ValueError("the times do not increase")
@@ -199,7 +204,7 @@ def _numbers(path: Path) -> dict[str, Array]:
         raise InputError(describe_os_error(error)) from error
     except ValueError as error:
         raise InputError(
-            f"'{path}' is damaged ({_short(error)}): restore it or run again"
+            f"'{path}' is damaged ({_shorten(error)}): restore it or run again"
         ) from error
     return history
 
@@ -242,10 +247,10 @@ def _compare(path: Path, file: StoredFile, history: Mapping[str, Array]) -> None
     for name, numbers in history.items():
         if name not in file or file[name].ndim != 1:
             raise ValueError(f"{HISTORY_H5}: the column {quote(name)} is missing")
-        other = file[name][: len(numbers)]
-        own = numbers[: len(other)]
-        same = (other == own) | (np.isnan(other) & np.isnan(own))
-        differ = np.flatnonzero(~same)
+        in_hdf5 = file[name][: len(numbers)]
+        in_csv = numbers[: len(in_hdf5)]
+        are_equal = (in_hdf5 == in_csv) | (np.isnan(in_hdf5) & np.isnan(in_csv))
+        differ = np.flatnonzero(~are_equal)
         if len(differ):
             csv = path.with_name(HISTORY_CSV)
             raise InputError(
@@ -255,7 +260,7 @@ def _compare(path: Path, file: StoredFile, history: Mapping[str, Array]) -> None
             )
 
 
-def _arrays(
+def _read_arrays(
     path: Path, history: Mapping[str, Array]
 ) -> tuple[dict[str, Array], ContactGeometry | None]:
     """Return (array columns when they have all rows, geometry of the contact points)."""

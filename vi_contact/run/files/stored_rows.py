@@ -25,7 +25,7 @@ from .folder import HISTORY_CSV, HISTORY_H5, JOURNAL, check_folder_format
 from .table import Block, Table
 
 
-def lines_of(table: Table, rows: Sequence[Row]) -> list[bytes]:
+def write_lines(table: Table, rows: Sequence[Row]) -> list[bytes]:
     """Return lines of history.csv.
 
     Whole numbers stay whole, all others are floats that read back to the last bit.
@@ -39,7 +39,7 @@ def lines_of(table: Table, rows: Sequence[Row]) -> list[bytes]:
     return [line + b"\n" for line in text[2:-2].split(b"],[")]
 
 
-def records_of(table: Table, block: Block) -> list[bytes]:
+def pack_records(table: Table, block: Block) -> list[bytes]:
     """Return the arrays of rows as the journal has them.
 
     They are float64, k first; empty ones when there are none.
@@ -100,7 +100,7 @@ class StoredRows:
                 )
             self.length = len(header)
             for lines, block in read_blocks(csv, self._table, arrays, k=self.k):
-                for line, record in zip(lines, records_of(self._table, block), strict=True):
+                for line, record in zip(lines, pack_records(self._table, block), strict=True):
                     self.length += len(line)
                     self.hash.update(line + record)
                 yield block
@@ -129,7 +129,7 @@ def read_blocks(
     done = first
     while True:
         lines = [line for line in islice(csv, table.block) if line.endswith(b"\n")]
-        numbers = numbers_of(csv.name, lines, len(table.numbers), done)
+        numbers = parse_numbers(csv.name, lines, len(table.numbers), done)
         steps = numbers[:, table.numbers.index("k")]
         if len(steps) and not np.array_equal(steps, steps[0] + np.arange(len(steps))):
             raise InputError(
@@ -152,7 +152,7 @@ def read_blocks(
             )
 
 
-def numbers_of(path: str, lines: list[bytes], width: int, before: int) -> Array:
+def parse_numbers(path: str, lines: list[bytes], width: int, before: int) -> Array:
     """Return the numbers of lines (rows, width).
 
     Args:
@@ -186,7 +186,7 @@ class StoredArrays:
         self._journal: Array
         if table.arrays:
             width = 1 + sum(sample.size for sample in table.arrays.values())  # k, then the arrays
-            self._journal = _journal_rows(folder / JOURNAL, width)
+            self._journal = _open_journal(folder / JOURNAL, width)
             try:
                 self._file = open_hdf5(self._path)
             except OSError as error:  # missing or damaged: the journal may still have all
@@ -207,10 +207,13 @@ class StoredArrays:
         if not self._samples:
             return {}
         n = self._count_in_hdf5(first, steps)
-        parts = [self._from_hdf5(first, n)] if n else []
+        parts = [self._read_hdf5(first, n)] if n else []
         if n < len(steps):
-            parts.append(self._from_journal(steps[n:]))
-        return {name: np.concatenate([part[name] for part in parts]) for name in self._samples}
+            parts.append(self._read_journal(steps[n:]))
+        block: Block = {}
+        for name in self._samples:
+            block[name] = np.concatenate([part[name] for part in parts])
+        return block
 
     def _count_in_hdf5(self, first: int, steps: Array) -> int:
         """Return how many of the rows history.h5 has, all of the right shape."""
@@ -229,7 +232,7 @@ class StoredArrays:
                 raise
             return 0
 
-    def _from_hdf5(self, first: int, n: int) -> Block:
+    def _read_hdf5(self, first: int, n: int) -> Block:
         """Return the arrays of n rows from the first on."""
         try:
             block = {}
@@ -245,7 +248,7 @@ class StoredArrays:
                 f"'{self._path}' is damaged ({error}): restore it or start a new run"
             ) from error
 
-    def _from_journal(self, steps: Array) -> Block:
+    def _read_journal(self, steps: Array) -> Block:
         """Return the arrays of these steps; InputError when they are not there."""
         journal = self._journal
         start = -1
@@ -268,7 +271,7 @@ class StoredArrays:
         return block
 
 
-def _journal_rows(path: Path, width: int) -> Array:
+def _open_journal(path: Path, width: int) -> Array:
     """Return the rows of the journal; one that was cut short by a crash is left out."""
     if not is_own(path):
         return np.zeros((0, width))
@@ -279,7 +282,7 @@ def _journal_rows(path: Path, width: int) -> Array:
         return np.memmap(file, dtype=float, mode="r", shape=(rows, width))
 
 
-def times_of(folder: Path, steps: Container[int]) -> dict[int, float]:
+def read_times(folder: Path, steps: Container[int]) -> dict[int, float]:
     """Return step -> time [s] of some rows of history.csv, whose first columns these are."""
     times: dict[int, float] = {}
     with open_to_read(folder / HISTORY_CSV) as file:

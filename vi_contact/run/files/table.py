@@ -118,7 +118,7 @@ class Table:
         if self._open:
             rows = self._open
             self._open = []
-            self._store(self._columns(rows))
+            self._store(self._make_columns(rows))
 
     def restore(self, block: Block) -> None:
         """Add rows of an earlier run.
@@ -131,7 +131,7 @@ class Table:
         self.count += len(block["k"])
         self._store(block)
 
-    def _columns(self, rows: list[Row]) -> Block:
+    def _make_columns(self, rows: list[Row]) -> Block:
         """Return rows as columns: numbers as float64, arrays as their recorder gives them."""
         block: Block = {}
         for name in self.numbers:
@@ -167,7 +167,7 @@ class Table:
         """Return what the rows say about the run, for its summary."""
         tally = copy.deepcopy(self._tally)
         if self._open:
-            tally.add(self._columns(self._open))
+            tally.add(self._make_columns(self._open))
         return tally.facts()
 
     def history(self) -> Mapping[str, Array]:
@@ -272,26 +272,28 @@ class Tally:
             self._first = {name: float(rows[name][0]) for name in ends}
         steps = slice(0 if self._rows else 1, None)
         self._rows += len(rows["t"])
-        self._add("iterations", rows["iterations"][steps])
-        self._add("escalated", rows["escalated"])
-        self._raise("iterations", rows["iterations"][steps])
-        self._raise("certificate", rows["certificate"])
+        self._add_to_sum("iterations", rows["iterations"][steps])
+        self._add_to_sum("escalated", rows["escalated"])
+        self._take_largest("iterations", rows["iterations"][steps])
+        self._take_largest("certificate", rows["certificate"])
         if "contact_uplift" in rows:
-            self._raise("uplift", rows["contact_uplift"])
-            self._raise("depth", -rows["contact_min_gap"], np.fmax)  # nan without contact points
-            self._add("contact", np.sign(rows["contact_active"][steps]))
+            self._take_largest("uplift", rows["contact_uplift"])
+            self._take_largest(
+                "depth", -rows["contact_min_gap"], np.fmax
+            )  # nan without contact points
+            self._add_to_sum("contact", np.sign(rows["contact_active"][steps]))
         if "energy_defect" in rows:
-            self._raise("energy", rows["energy_kinetic"] + rows["energy_strain"])
-            self._raise("work", np.abs(rows["work_input"]))
-            self._raise("defect", np.abs(rows["energy_defect"]))
+            self._take_largest("energy", rows["energy_kinetic"] + rows["energy_strain"])
+            self._take_largest("work", np.abs(rows["work_input"]))
+            self._take_largest("defect", np.abs(rows["energy_defect"]))
             losses = sum(rows[name] for name in LEDGER if name.startswith("loss_"))
-            self._raise("created", -np.asarray(losses))
+            self._take_largest("created", -np.asarray(losses))
 
-    def _add(self, name: str, values: Array) -> None:
+    def _add_to_sum(self, name: str, values: Array) -> None:
         """Add values to a sum."""
         self._sums[name] = self._sums.get(name, 0.0) + float(np.sum(values))
 
-    def _raise(self, name: str, values: Array, larger: np.ufunc = np.maximum) -> None:
+    def _take_largest(self, name: str, values: Array, larger: np.ufunc = np.maximum) -> None:
         """Take the largest so far.
 
         Args:
@@ -324,10 +326,10 @@ class Tally:
                 "steps_in_contact": int(self._sums["contact"]),
             }
         if "defect" in most:
-            facts |= self._energy()
+            facts |= self._sum_up_energy()
         return facts
 
-    def _energy(self) -> dict[str, Any]:
+    def _sum_up_energy(self) -> dict[str, Any]:
         """Return the ledger at the end [J], and its largest defect.
 
         The defect is relative to the largest energy or input work of the run.

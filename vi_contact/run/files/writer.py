@@ -21,7 +21,7 @@ from .checkpoint import RestartPoint, write_checkpoint
 from .folder import CHECKPOINT, LOG, SUMMARY, clear, remove_litter, take
 from .history import GEOMETRY, HistoryFiles
 from .log import RunLog
-from .stored_rows import StoredRows, times_of
+from .stored_rows import StoredRows, read_times
 from .table import Table
 
 log = logging.getLogger(__name__)
@@ -92,13 +92,13 @@ class Writer:
             and folder is not None
             and stored.folder.resolve() == folder.resolve()
         )
-        self._settings = fields
+        self._settings = fields  # which make the open ``_fields``
         self._comm = problem.system.algebra.comm
         self._fields: OpenFields | None = None
         self._files: HistoryFiles | None = None
         self._log: RunLog | None = None
-        self._step_of_checkpoint = -1
-        self._waiting: list[Row] = []
+        self._step_of_checkpoint = -1  # of the last one
+        self._waiting: list[Row] = []  # rows that are neither in the files nor in the table
         self._time_of_row = time.monotonic()
         self._time_of_flush = self._time_of_row
 
@@ -114,14 +114,18 @@ class Writer:
         folder = self.folder
         if folder is None:
             return
+
+        # Log and histories, on rank 0, with the contact points of all ranks.
         surface = self._problem.surface
         geometry = {name: surface.on_first(getattr(surface, name)) for name in GEOMETRY}
         on_root(self._comm, partial(self._make, folder, geometry))
+
+        # Fields, on all ranks; of a run that goes on in its folder earlier frames stay.
         if self._settings is not None:
-            kept: Mapping[int, float] = {}
+            frames: Mapping[int, float] = {}
             if self._continued:
-                kept = on_root(self._comm, lambda: times_of(folder, list_frames(folder))) or {}
-            self._fields = self._settings.open(self._problem, folder, kept)
+                frames = on_root(self._comm, lambda: read_times(folder, list_frames(folder))) or {}
+            self._fields = self._settings.open(self._problem, folder, frames)
             if not self._continued:
                 self._fields.write(state, np.zeros_like(state.u))
 

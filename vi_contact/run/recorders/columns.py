@@ -3,7 +3,7 @@
 from ...core.step import Columns
 
 
-def along_axes(columns: Columns, axes: str) -> Columns:
+def expand_axes(columns: Columns, axes: str) -> Columns:
     """Return the columns with {axis} in their names and meanings filled in for each of the axes."""
     named = {}
     for name, (unit, meaning) in columns.items():

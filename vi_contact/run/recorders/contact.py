@@ -11,7 +11,7 @@ from ...core.arguments import check_fields
 from ...core.problem import ContactProblem
 from ...core.step import AXES, Columns, Report, Row, State
 from ...core.surfaces import ContactSurface
-from .columns import along_axes
+from .columns import expand_axes
 
 # Column -> (unit, meaning). One with {axis} in its name is recorded once for each axis.
 _CONTACT_COLUMNS: Columns = {
@@ -40,10 +40,14 @@ _FRICTION_COLUMNS: Columns = {
 }
 
 
-def mask_of_covered(surface: ContactSurface) -> Mask | None:
-    """Return the conditions (m,) of this rank whose pressure counts among the largest.
+def find_covered(surface: ContactSurface) -> Mask | None:
+    """Return the conditions (m,) of this rank whose pressure counts among the largest. Collective.
 
-    It is None where all count: where none is ``uncovered``, or all on all ranks are. Collective.
+    At ``uncovered`` points, in front of which there is little of the other side, r_n / weight is no
+    pressure.
+
+    Returns:
+        The mask; None where all count, because no condition is uncovered, or all of all ranks are.
     """
     uncovered = surface.uncovered
     if uncovered is None:
@@ -77,6 +81,7 @@ class Contact:
     # those of the problem, once it is started
     _axes = AXES
     _frictional = False
+    # columns with arrays, in the order of ``_gather``
     _ARRAYS: ClassVar[tuple[str, ...]] = ("pressure", "gap", "active", "traction_t", "slip")
 
     def __post_init__(self) -> None:
@@ -87,9 +92,9 @@ class Contact:
 
         Call ``start`` first.
         """
-        columns = along_axes(_CONTACT_COLUMNS, self._axes)
+        columns = expand_axes(_CONTACT_COLUMNS, self._axes)
         if self._frictional:
-            columns = {**columns, **along_axes(_FRICTION_COLUMNS, self._axes)}
+            columns = {**columns, **expand_axes(_FRICTION_COLUMNS, self._axes)}
         if self.arrays:
             return columns
         return {name: about for name, about in columns.items() if name not in self._ARRAYS}
@@ -97,13 +102,19 @@ class Contact:
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Row:
-        """Return the row of the initial contact: of a gravity stage, or open."""
+        """Return the row of the initial contact: of a gravity stage, or open. Collective.
+
+        Args:
+            problem: what is marched.
+            state: the first state.
+            resumed: the last row of the run that is continued, None for a new run.
+        """
         surface = problem.surface
         self._problem = problem
         self._frictional = problem.frictional
         self._axes = AXES[: surface.points.shape[1]]
         self._weight = total(surface.comm, surface.weights.sum())
-        self._covered = mask_of_covered(surface)
+        self._covered = find_covered(surface)
         self._numbers = [name for name in self.columns() if name not in self._ARRAYS]
         return self._row(state)
 
@@ -112,16 +123,21 @@ class Contact:
         return self._row(report.new)
 
     def _row(self, state: State) -> Row:
-        """Return the row of a state. Collective."""
+        """Return the row of a state. Collective.
+
+        Values are listed in the order of the columns.
+        """
+        # What conditions of this rank have: gap, pressure and, with friction, traction and slip.
         surface = self._problem.surface
         r_n = state.r_n
         gap = surface.gap(state.t) - surface.normal_values(state.u)
-        if not surface.plain:
+        if not surface.plain:  # springs get shorter under pressure
             gap = gap + surface.compliance * r_n
         pressure = r_n / surface.weights
-        rubbing = self._rubbing(state) if self._frictional else ()
+        rubbing = self._find_rubbing(state) if self._frictional else ()
 
-        # Sums over the conditions of this rank, then of all ranks in one message.
+        # Sums over the conditions of this rank, then of all ranks in one message: closed area and
+        # number, Σ r_n, Σ r_n n, Σ r_n X.
         sums = [
             float(np.add.reduce(surface.weights[state.active])),
             float(np.count_nonzero(state.active)),
@@ -135,8 +151,9 @@ class Contact:
         pull = vectors[: len(self._axes)]
         moment = vectors[len(self._axes) :]
 
-        # Largest values; moving obstacles also watch what lies between the points.
-        depth, highest, *farthest = self._largest(gap, pressure, *rubbing[1:])
+        # Largest values: depth = -gap, pressure and slip. Moving obstacles also watch what lies
+        # between the points.
+        depth, highest, *farthest = self._find_largest(gap, pressure, *rubbing[1:])
         depth = max([depth, *(-watched.smallest(state.t) for watched in surface.watched)])
 
         values = [
@@ -149,7 +166,7 @@ class Contact:
             highest,
         ]
         if self._frictional:
-            values += [*self._friction_force(state), *farthest]
+            values += [*self._sum_friction(state), *farthest]
         row: dict[str, Any] = dict(zip(self._numbers, values, strict=True))
         if self.arrays:
             arrays = self._gather(pressure, gap, state.active, *rubbing)
@@ -171,7 +188,7 @@ class Contact:
         rubbing = np.hsplit(table[:, 3:], 2) if self._frictional else ()
         return [array.copy() for array in (pressure, gap, active, *rubbing)]
 
-    def _largest(self, gap: Array, pressure: Array, *slip: Array) -> list[float]:
+    def _find_largest(self, gap: Array, pressure: Array, *slip: Array) -> list[float]:
         """Return the largest depth, pressure and slip of all conditions; nan without any.
 
         Args:
@@ -183,18 +200,18 @@ class Contact:
         if not surface.total:
             return [np.nan] * (2 + len(slip))
         covered = pressure if self._covered is None else pressure[self._covered]
-        tops = [
-            -gap.item(gap.argmin()) if len(gap) else -np.inf,
+        own = [
+            -gap.item(gap.argmin()) if len(gap) else -np.inf,  # item is faster than float(max())
             covered.item(covered.argmax()) if len(covered) else -np.inf,
         ]
         for vectors in slip:
-            tops.append(float(np.linalg.norm(vectors, axis=1).max()) if len(gap) else -np.inf)
+            own.append(float(np.linalg.norm(vectors, axis=1).max()) if len(gap) else -np.inf)
         if surface.comm.size == 1:
-            return tops
-        largest: list[float] = surface.comm.max(np.array(tops)).tolist()
+            return own
+        largest: list[float] = surface.comm.max(np.array(own)).tolist()
         return largest
 
-    def _rubbing(self, state: State) -> tuple[Array, Array]:
+    def _find_rubbing(self, state: State) -> tuple[Array, Array]:
         """Return tangential tractions [Pa] and slips [m], (m, d - 1) each."""
         surface = self._problem.surface
         slip = surface.slip(state.u, state.t)
@@ -202,7 +219,7 @@ class Contact:
             return np.zeros_like(slip), slip
         return state.r_t / surface.weights[:, None], slip
 
-    def _friction_force(self, state: State) -> list[float]:
+    def _sum_friction(self, state: State) -> list[float]:
         """Return the components [N] of the friction force on the body, -Σ r_t t. Collective."""
         surface = self._problem.surface
         system = self._problem.system

@@ -44,32 +44,51 @@ from ...core.errors import InputError
 from ...core.step import AXES
 from ...core.surfaces import ContactSurface
 
-Where = Callable[[Array, Array], Mask]
-# with points (m, d), normals (m, d), weights (m,): a ContactSurface, the contact of a RunFolder
+Where = Callable[[Array, Array], Mask]  # points (m, d) [m], normals (m, d) -> mask (m,) of a part
+# what has points (m, d), normals (m, d), weights (m,): a ContactSurface, the contact of a RunFolder
 Geometry = Any
 # of the largest singular value of the rigid modes of a part: less says nothing about a motion
 DETERMINED = 1e-9
+CANCEL = 1e-6  # of the weight of a part: normals whose sum is shorter have no mean direction
 
 
 def check_part(name: str, centre: Any, where: Any, normal: Any) -> None:
-    """Raise InputError unless centre and direction are numbers and the mask is a function."""
-    optional(array, f"part '{name}'", "the centre", centre, (None,), unit="metres")
-    optional(
-        function, f"part '{name}'", "where", where, "give a function of points and normals, or None"
-    )
-    optional(array, f"part '{name}'", "normal", normal, (None,))
+    """Raise InputError unless centre and direction are numbers and the mask is a function.
+
+    Args:
+        name: of the part, for the sentence.
+        centre: of the part (d,) [m], or None.
+        where: what picks the points, or None.
+        normal: direction of N (d,), or None.
+    """
+    owner = f"part '{name}'"
+    optional(array, owner, "the centre", centre, (None,), unit="metres")
+    remedy = "give a function of points and normals, or None"
+    optional(function, owner, "where", where, remedy)
+    optional(array, owner, "normal", normal, (None,))
 
 
 class Part:
-    """Hold the points of a contact surface that a mask picks.
+    """Hold a part of a contact surface: its points, and what makes its resultants of their values.
 
-    With them come the directions of its resultants.
+    Centre, direction and sizes are those of the whole part; arrays have a row for each of the k
+    points of it whose condition this rank holds.
 
-    ``where``: points (m, d), normals (m, d) -> mask (m,); all points when None. InputError for a
-    part without points, a centre of other dimension, or directions that cancel (a closed ring),
-    unless ``normal`` says which N is meant. ``centre`` None: the middle of the part by weight, at
-    the level of its lowest point. ``slots``: the numbers of the conditions whose share in it is
-    held; those of one rank, all when None.
+    Attributes:
+        name: of the part.
+        dimension: d.
+        centre: (d,) [m], about which moments count.
+        normal: (d,) unit vector n̄ towards the support, the direction of N.
+        whole: sum of the weights of the whole part [m²].
+        lowest: height of the lowest point above the centre [m]; nan where the part has no height.
+        tall: height of the part [m].
+        mask: (m,) which conditions of this rank are in the part.
+        weights: (k,) areas of the points [m²].
+        normals: (k, d) their contact directions.
+        tangents: (k, d, d - 1) their tangents.
+        arms: (k, d) X - c [m].
+        fit: (k, q + 1): u_n @ fit is theta (q,) [rad] and the settlement [m].
+        ends: (k, 2): r_n @ ends is the pressure at the low and at the high end [Pa].
     """
 
     def __init__(
@@ -81,136 +100,205 @@ class Part:
         normal: Sequence[float] | None,
         slots: Indices | None = None,
     ) -> None:
+        """Pick the points, and find centre, direction and sizes of the part.
+
+        Args:
+            name: of the part.
+            geometry: all conditions of the surface, of all ranks.
+            centre: (d,) [m]; None for the middle of the part by weight, at the level of its lowest
+                point.
+            where: picks the points; None for all of them.
+            normal: which N is meant; None for the mean direction of the part by weight.
+            slots: the numbers of the conditions whose rows are held, those of one rank; None for
+                all.
+
+        Raises:
+            InputError: the part has no points, the centre is of another dimension, or the
+                directions cancel (a closed ring) and no ``normal`` is given.
+        """
         check_part(name, centre, where, normal)
-        points, normals = geometry.points, geometry.normals
-        given = np.ones(len(points), dtype=bool) if where is None else where(points, normals)
-        chosen = mask(
-            f"part '{name}'", "what where(points, normals) returns", given, (len(points),)
-        )
+        self.name = name
+        owner = f"part '{name}'"
+
+        # The points of the part, out of all points of the surface.
+        points = geometry.points
+        normals = geometry.normals
+        chosen = np.ones(len(points), dtype=bool)
+        if where is not None:
+            meaning = "what where(points, normals) returns"
+            chosen = mask(owner, meaning, where(points, normals), (len(points),))
         if not chosen.any():
             raise InputError(f"part '{name}' has no contact points: change its mask")
-        weights, box = geometry.weights[chosen], points[chosen]
-        middle = (
-            np.append((weights @ box / weights.sum())[:-1], box[:, -1].min())
-            if centre is None
-            else centre
-        )
-        self.centre = array(f"part '{name}'", "the centre", middle, points.shape[1:], unit="metres")
-        self.name, self.dimension = name, points.shape[1]
-        self.weights, self.normals, self.arms = (
-            geometry.weights[chosen],
-            normals[chosen],
-            points[chosen] - self.centre,
-        )
-        self.normal, self.whole = self._direction(name, normal), self.weights.sum()
-        # run folders do not tell of nodes
-        places = np.unique(points, axis=0, return_inverse=True)[1].ravel()
-        self.tangents = make_tangent_vectors(normals, getattr(geometry, "nodes", places))[chosen]
-        self.fit, self.ends = self._fit().T, self._ends(box).T
-        lowest, self.tall = float(box[:, -1].min() - self.centre[-1]), float(np.ptp(box[:, -1]))
-        self.lowest = lowest if self.tall > DETERMINED * np.ptp(box, axis=0).max() else np.nan
+        self.dimension = points.shape[1]
+        self.weights = geometry.weights[chosen]
+        self.normals = normals[chosen]
+        self.whole = self.weights.sum()
+        places = points[chosen]
+
+        # Centre, direction and height.
+        place: Any = centre
+        if centre is None:
+            middle = self.weights @ places / self.weights.sum()
+            place = np.append(middle[:-1], places[:, -1].min())
+        self.centre = array(owner, "the centre", place, points.shape[1:], unit="metres")
+        self.arms = places - self.centre
+        self.normal = self._find_direction(normal)
+        self.tall = float(np.ptp(places[:, -1]))
+        self.lowest = float(places[:, -1].min() - self.centre[-1])
+        if not self.tall > DETERMINED * np.ptp(places, axis=0).max():
+            self.lowest = np.nan  # a level part
+
+        # The tangents of a node are those of all its conditions; run folders do not tell of nodes,
+        # whose places stand for them.
+        numbers = np.unique(points, axis=0, return_inverse=True)[1].ravel()
+        self.tangents = make_tangent_vectors(normals, getattr(geometry, "nodes", numbers))[chosen]
+        self.fit = self._fit_motion().T
+        self.ends = self._average_ends(places).T
+
+        # Of all this only the rows of one rank stay.
         slots = np.arange(len(points)) if slots is None else slots
         self.mask = chosen[slots]
-        for kept in ("weights", "normals", "arms", "tangents", "fit", "ends"):
-            setattr(self, kept, getattr(self, kept)[(np.cumsum(chosen) - 1)[slots[self.mask]]])
+        own = (np.cumsum(chosen) - 1)[slots[self.mask]]
+        for attribute in ("weights", "normals", "arms", "tangents", "fit", "ends"):
+            setattr(self, attribute, getattr(self, attribute)[own])
 
-    def _direction(self, name: str, given: Sequence[float] | None) -> Array:
-        direction = self.weights @ self.normals if given is None else given
-        direction = array(f"part '{name}'", "normal", direction, self.centre.shape)
+    def _find_direction(self, normal: Sequence[float] | None) -> Array:
+        """Return the unit vector n̄: along ``normal``, or the mean of the part's by weight."""
+        direction = self.weights @ self.normals if normal is None else normal
+        owner = f"part '{self.name}'"
+        direction = array(owner, "normal", direction, self.centre.shape)
         size = float(np.linalg.norm(direction))
-        if size <= 1e-6 * (self.weights.sum() if given is None else 1.0):
+        if size <= CANCEL * (self.weights.sum() if normal is None else 1.0):
             raise InputError(
-                f"part '{name}': its contact directions cancel: give the direction of N by normal="
+                f"{owner}: its contact directions cancel: give the direction of N by normal="
             )
         return np.asarray(direction / size)
 
-    def _ends(self, points: Array) -> Array:
-        """Return rows (2, k) that make the pressures at the low and the high end of r_n.
+    def _average_ends(self, places: Array) -> Array:
+        """Return rows (2, k) that make of r_n the pressures at the low and the high end.
 
-        The ends are those along the longest axis.
+        The ends are those along the longest axis; the pressure there is the sum of r_n over the sum
+        of the weights.
+
+        Args:
+            places: of the points (k, d) [m].
         """
-        along = points[:, np.argmax(np.ptp(points, axis=0))]
+        along = places[:, np.argmax(np.ptp(places, axis=0))]
         slack = DETERMINED * np.ptp(along)
         ends = np.stack([along <= along.min() + slack, along >= along.max() - slack])
         return np.asarray(ends / (ends @ self.weights)[:, None])
 
-    def _fit(self) -> Array:
-        """Return rows (q + 1, k) that make theta and settlement of normal displacements.
+    def _fit_motion(self) -> Array:
+        """Return rows (q + 1, k) that make of u_n the rotation theta and the settlement.
 
-        What is not determined is nan.
+        A rigid motion (u, theta) has the normal displacements u·n + theta·(arm x n). The smallest
+        one that fits u_n best, by weight, is
+
+            p = (√w modes)⁺ √w u_n,    p = (u, size theta),    modes = [n, (arm x n) / size]
+
+        with theta in units of 1 / size, so that its entries compare with those of u. A row of what
+        the points do not determine is nan.
         """
         size = float(np.max(np.abs(self.arms), initial=0.0)) or 1.0
-        turns = [one / size for one in turning(self.arms, self.normals)]
-        root, modes = np.sqrt(self.weights), np.column_stack([self.normals, *turns])
-        asked = np.roll(block_diag(self.normal, np.eye(len(turns)) / size), -1, axis=0)
+        turns = [component / size for component in cross(self.arms, self.normals)]
+        root = np.sqrt(self.weights)
+        modes = np.column_stack([self.normals, *turns])
         inverse = np.linalg.pinv(root[:, None] * modes, rcond=DETERMINED) * root
-        told = np.linalg.norm(asked @ inverse @ modes, axis=1) > DETERMINED * np.linalg.norm(
-            asked, axis=1
-        )
-        return np.where(told[:, None], asked @ inverse, np.nan)
 
-    def sums(self, r_n: Array, r_t: Array | None, active: Mask) -> Array:
-        """Return (rows, …) of sums.
+        # What is asked of p: theta, and after it the settlement u·n̄.
+        asked = np.roll(block_diag(self.normal, np.eye(len(turns)) / size), -1, axis=0)
 
-        They are F, M, Σ r_n, Σ r_n (X - c)·up and the open weight of rows of reactions, (rows, m),
-        (rows, m, d - 1) or None, and of closed conditions (rows, m).
+        # asked p of a motion that u_n does not see is zero: nothing is said about such a row.
+        seen = np.linalg.norm(asked @ inverse @ modes, axis=1)
+        is_determined = seen > DETERMINED * np.linalg.norm(asked, axis=1)
+        return np.where(is_determined[:, None], asked @ inverse, np.nan)
+
+    def sum_up(self, r_n: Array, r_t: Array | None, active: Mask) -> Array:
+        """Return what adds up over the points of this rank, for several states at once.
+
+        Args:
+            r_n: normal reactions (rows, m) [N].
+            r_t: tangential reactions (rows, m, d - 1) [N], or None.
+            active: which conditions are closed (rows, m).
+
+        Returns:
+            (rows, d + q + 3): F [N], M [N m], Σ r_n [N], Σ r_n (X - c)·up [N m], and the weight
+            that is open [m²].
         """
         r_n = r_n[:, self.mask]
-        at_points = -r_n[:, :, None] * self.normals
+        forces = -r_n[:, :, None] * self.normals  # on the body
         if r_t is not None:
-            at_points = at_points - np.einsum("rkc,kdc->rkd", r_t[:, self.mask], self.tangents)
-        moments = [one.sum(axis=1) for one in turning(self.arms, at_points)]
-        lifted = (~active[:, self.mask]) @ self.weights
+            forces = forces - np.einsum("rkc,kdc->rkd", r_t[:, self.mask], self.tangents)
+        moments = [component.sum(axis=1) for component in cross(self.arms, forces)]
+        is_open = ~active[:, self.mask]
         return np.column_stack(
-            [at_points.sum(axis=1), *moments, r_n.sum(axis=1), r_n @ self.arms[:, -1], lifted]
+            [
+                forces.sum(axis=1),
+                *moments,
+                r_n.sum(axis=1),
+                r_n @ self.arms[:, -1],
+                is_open @ self.weights,
+            ]
         )
 
-    def tops(self, gap: Array, slip: Array | None) -> Array:
-        """Return (rows, 1 or 2) the largest gap and slip.
+    def find_largest(self, gap: Array, slip: Array | None) -> Array:
+        """Return the largest gap [m] and, with friction, slip [m] of this rank: (rows, 1 or 2).
 
-        They are those of rows (rows, m), (rows, m, d - 1) or None.
+        Args:
+            gap: (rows, m) [m].
+            slip: (rows, m, d - 1) [m], or None.
         """
-        found = [gap[:, self.mask]]
+        sizes = [gap[:, self.mask]]
         if slip is not None and slip.shape[2]:
-            found.append(np.linalg.norm(slip[:, self.mask], axis=2))
-        return np.column_stack([one.max(axis=1, initial=-np.inf) for one in found])
+            sizes.append(np.linalg.norm(slip[:, self.mask], axis=2))
+        return np.column_stack([values.max(axis=1, initial=-np.inf) for values in sizes])
 
-    def quantities(self, sums: Array, tops: Array) -> dict[str, Array]:
-        """Return quantity -> (rows,) of sums and tops of all its points.
+    def derive(self, sums: Array, largest: Array) -> dict[str, Array]:
+        """Return quantity -> (rows,), by the equations at the head of this file.
 
-        They are nan where N or Σ r_n is zero.
+        e and height are nan where N or Σ r_n is zero.
+
+        Args:
+            sums: of ``sum_up``, over all ranks.
+            largest: of ``find_largest``, of all ranks.
         """
         d = self.dimension
-        force, moment, (thrust, raised, lifted) = 0.0 + sums[:, :d], sums[:, d:-3], sums.T[-3:]
+        force = 0.0 + sums[:, :d]  # no negative zeros
+        moment = sums[:, d:-3]
+        thrust, raised, open_weight = sums.T[-3:]
         compression = 0.0 - force @ self.normal
-        across, lever = force + compression[:, None] * self.normal, np.zeros((len(sums), d))
+        across = force + compression[:, None] * self.normal
 
-        def along(kind: str, vectors: Array) -> dict[str, Array]:
-            return {f"{kind}_{axis}": vectors[:, i] for i, axis in enumerate(AXES[:d])}
+        # What there is in any dimension.
+        values = {"uplift": open_weight / self.whole}
+        values |= dict(zip(("opening", "slip"), largest.T, strict=False))
+        values |= _name_components("force", force)
+        values["N"] = compression
+        values["T"] = np.linalg.norm(across, axis=1)
+        e = _divide(np.zeros(len(sums)), compression)
 
-        found = {"uplift": lifted / self.whole} | dict(
-            zip(("opening", "slip"), tops.T, strict=False)
-        )
-        found |= along("force", force) | {"N": compression, "T": np.linalg.norm(across, axis=1)}
-        if d == 2:
-            found |= {"T": force @ [-self.normal[1], self.normal[0]], "M": moment[:, 0]}
-            return found | {
-                "e": _ratio(moment[:, 0], compression),
-                "height": _ratio(raised, thrust),
-            }
-        if d == 3:
+        if d == 2:  # T, M and e have signs
+            values["T"] = force @ [-self.normal[1], self.normal[0]]
+            values["M"] = moment[:, 0]
+            e = _divide(moment[:, 0], compression)
+        if d == 3:  # they are vectors: T and e are their sizes
             lever = np.cross(moment, self.normal)
-            found |= (
-                along("T", across) | along("M", moment) | along("e", _ratio(lever.T, compression).T)
-            )
-        return found | {
-            "e": _ratio(np.linalg.norm(lever, axis=1), compression),
-            "height": _ratio(raised, thrust),
-        }
+            values |= _name_components("T", across)
+            values |= _name_components("M", moment)
+            values |= _name_components("e", _divide(lever.T, compression).T)
+            e = _divide(np.linalg.norm(lever, axis=1), compression)
+        values["e"] = e
+        values["height"] = _divide(raised, thrust)
+        return values
 
 
-def turning(arms: Array, vectors: Array) -> list[Array]:
-    """Return the components (…) of arms x vectors (…, d).
+def _name_components(quantity: str, vectors: Array) -> dict[str, Array]:
+    """Return <quantity>_x, … -> (rows,) of vectors (rows, d)."""
+    return {f"{quantity}_{axis}": vectors[:, i] for i, axis in enumerate(AXES[: vectors.shape[1]])}
+
+
+def cross(arms: Array, vectors: Array) -> list[Array]:
+    """Return the components (…) of arms x vectors, both (…, d).
 
     They are x, y, z in space, z in the plane, none on a line.
     """
@@ -218,8 +306,10 @@ def turning(arms: Array, vectors: Array) -> list[Array]:
     return [arms[..., i] * vectors[..., j] - arms[..., j] * vectors[..., i] for i, j in pairs]
 
 
-def _ratio(one: Array, other: Array) -> Array:
-    return np.divide(one, other, out=np.full(one.shape, np.nan), where=other != 0.0)
+def _divide(numerator: Array, denominator: Array) -> Array:
+    """Return the quotient, nan where the denominator is zero."""
+    quotient = np.full(numerator.shape, np.nan)
+    return np.divide(numerator, denominator, out=quotient, where=denominator != 0.0)
 
 
 def contact_summary(
@@ -231,22 +321,28 @@ def contact_summary(
     where: Where | None = None,
     normal: Sequence[float] | None = None,
 ) -> dict[str, Array]:
-    """Return the resultants of a run that recorded ``Contact()``.
+    """Return the resultants of a part in all steps of a run that recorded ``Contact()``.
 
-    They are quantity -> (rows,), without theta and settlement.
+    The equations are at the head of this file. Slip and friction count where they were recorded,
+    with friction.
 
-    ``geometry``: the surface of the problem (then collective), or ``read_run(folder).contact``.
-    Slip and friction count where they were recorded, with friction. InputError without arrays of
-    the contact points.
+    Args:
+        history: column -> values, of a solution or a run folder, with arrays of the contact points.
+        geometry: the surface of the problem (then collective), or ``read_run(folder).contact``.
+        centre: (d,) [m], about which moments count.
+        name: of the part, for sentences.
+        where: points (m, d) [m], normals (m, d) -> mask (m,) of the part; None for all.
+        normal: direction of N towards the support; None for the mean contact direction.
+
+    Returns:
+        Quantity -> (rows,), without theta and settlement, which need displacements.
+
+    Raises:
+        InputError: the history has no arrays of the contact points, or the part makes no sense.
     """
     instance("contact_summary", "history", history, Mapping, "give the history of a solution")
-    provides(
-        "contact_summary",
-        "geometry",
-        geometry,
-        ("points", "normals", "weights"),
-        "give a contact surface",
-    )
+    needed = ("points", "normals", "weights")
+    provides("contact_summary", "geometry", geometry, needed, "give a contact surface")
     column_name("part name", name)
     missing = [column for column in ("pressure", "gap", "active") if column not in history]
     if missing:
@@ -255,14 +351,19 @@ def contact_summary(
         )
     geometry = geometry.whole() if isinstance(geometry, ContactSurface) else geometry
     part = Part(name, geometry, centre, where, normal)
-    rows, m = len(history["t"]), len(geometry.weights)
+    rows = len(history["t"])
+    m = len(geometry.weights)
 
-    def per_point(column: str) -> Array:
+    def read(column: str) -> Array:
+        """Return a column as (rows, m, components)."""
         return np.reshape(np.asarray(history[column], dtype=float), (rows, m, -1))
 
-    r_t = per_point("traction_t") * geometry.weights[:, None] if "traction_t" in history else None
-    slip = per_point("slip") if "slip" in history else None
-    sums = part.sums(
-        per_point("pressure")[:, :, 0] * geometry.weights, r_t, per_point("active")[:, :, 0] > 0.5
-    )
-    return part.quantities(sums, part.tops(per_point("gap")[:, :, 0], slip))
+    # Reactions are pressures times areas.
+    r_n = read("pressure")[:, :, 0] * geometry.weights
+    r_t = None
+    if "traction_t" in history:
+        r_t = read("traction_t") * geometry.weights[:, None]
+    slip = read("slip") if "slip" in history else None
+    active = read("active")[:, :, 0] > 0.5
+    gap = read("gap")[:, :, 0]
+    return part.derive(part.sum_up(r_n, r_t, active), part.find_largest(gap, slip))

@@ -51,24 +51,30 @@ class Energy:
         """Return the initial energies.
 
         Works and losses are zero, or those of the run that is continued.
+
+        Args:
+            problem: what is marched.
+            state: the first state.
+            resumed: the last row of the run that is continued, None for a new run.
         """
         self._problem = problem
         self._now = compute_energies(problem.equations, state.u, state.v)
-        self._stored = self._stored_by_strains(state)
+        self._stored = self._compute_stored(state)
         self._sums = dict.fromkeys(self._SUMS, 0.0)
         if resumed is not None:
             self._sums = {term: float(resumed[term]) for term in self._SUMS}
         return self._row()
 
     def _row(self) -> Row:
+        """Return the energies now, and works and losses so far."""
         return {
             "energy_kinetic": self._now.kinetic,
             "energy_strain": self._now.strain + self._stored,
             **self._sums,
         }
 
-    def _stored_by_strains(self, state: State) -> float:
-        """Return what initial strains add to ½ uᵀKu [J]."""
+    def _compute_stored(self, state: State) -> float:
+        """Return what initial strains add to ½ uᵀKu [J], -f_0·u + ½ ∫ eps_0 : C eps_0."""
         initial = getattr(getattr(self._problem.system.space, "forms", None), "initial", None)
         if initial is None:
             return 0.0
@@ -94,7 +100,7 @@ class Energy:
 
         # Rates of initial strains do the work by which the energy they store has grown.
         before = self._stored
-        self._stored = self._stored_by_strains(new)
+        self._stored = self._compute_stored(new)
         losses = (
             step.input + (self._stored - before),
             step.damping,

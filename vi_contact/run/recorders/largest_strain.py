@@ -32,7 +32,16 @@ class LargestStrain:
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Row:
-        """Measure from this state on. Collective."""
+        """Measure from this state on. Collective.
+
+        Args:
+            problem: what is marched.
+            state: the first state.
+            resumed: the last row of the run that is continued, None for a new run.
+
+        Raises:
+            InputError: the run is continued, or the body is on a line.
+        """
         if resumed is not None:
             raise InputError(
                 "LargestStrain does not know the strains before the checkpoint: run from the start"

@@ -66,7 +66,16 @@ class Probe:
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Row:
-        """Find the nodes."""
+        """Find the nodes; return the row of the first state. Collective.
+
+        Args:
+            problem: what is marched.
+            state: the first state.
+            resumed: the last row of the run that is continued, None for a new run.
+
+        Raises:
+            InputError: a point has another dimension than the body, or is outside it.
+        """
         self._problem = problem
         dimension = problem.system.space.dimension
         points = np.array(list(self.points.values()), dtype=float)
@@ -84,14 +93,15 @@ class Probe:
     def row(self, report: Report) -> Row:
         """Return the row of the step that ``report`` tells of."""
 
-        def acceleration() -> Array:
+        def sample_acceleration() -> Array:
+            """Return the absolute accelerations (p, d) [m/s²], which cost a balance."""
             ground = self._problem.ground_acceleration
             t_old = report.old.t
             t_new = report.new.t
             mean = 0.5 * (ground(t_old) + ground(t_new))
             return self._sample(report.balance.a, t_new, 2) + mean
 
-        return self._row(report.new, acceleration)
+        return self._row(report.new, sample_acceleration)
 
     def _row(self, state: State, acceleration: Callable[[], Array]) -> Row:
         """Return the row of a state; ``acceleration`` (p, d) [m/s²] is called if it is recorded."""

@@ -56,7 +56,16 @@ class Racking:
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Row:
-        """Find the nodes."""
+        """Find the nodes; return the row of the first state. Collective.
+
+        Args:
+            problem: what is marched.
+            state: the first state.
+            resumed: the last row of the run that is continued, None for a new run.
+
+        Raises:
+            InputError: the body is not plane, or a corner is outside it.
+        """
         self._problem = problem
         space = problem.system.space
         if space.dimension != 2:

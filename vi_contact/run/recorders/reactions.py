@@ -86,6 +86,14 @@ class Reactions:
         """Prepare the work of rigid motions of the held nodes; return the row of the state at rest.
 
         Collective.
+
+        Args:
+            problem: what is marched.
+            state: the first state.
+            resumed: the last row of the run that is continued, None for a new run.
+
+        Raises:
+            InputError: the boundary is neither held nor has it dashpots.
         """
         owner = f"reactions '{self.name}'"
         self._work = NodalWork(owner, problem, self.loads, self.gravity)

@@ -115,27 +115,36 @@ class Resultants:
         """Find the part once, and return the row of the state, a static one or the start of a run.
 
         Collective.
+
+        Args:
+            problem: what is marched.
+            state: the first state.
+            resumed: the last row of the run that is continued, None for a new run.
+
+        Raises:
+            InputError: the part has no contact points, or there is no direction of N.
         """
         self._problem = problem
         self._surface = problem.surface
         whole = problem.surface.whole()
-        where = self.where if self.part is None else self._where(whole)
+        where = self.where if self.part is None else self._make_where(whole)
         self._part = Part(self.name, whole, self.centre, where, self.normal, problem.surface.slots)
         return self._row(state)
 
-    def _where(self, whole: ContactSurface) -> Where:
+    def _make_where(self, whole: ContactSurface) -> Where:
         """Return what picks the conditions of ``part`` out of all. Collective."""
-        chosen = self._in_group(whole) if hasattr(self.part, "indices") else self._in_box(whole)
+        is_group = hasattr(self.part, "indices")
+        chosen = self._pick_in_group(whole) if is_group else self._pick_in_box(whole)
         return lambda points, normals: chosen
 
-    def _in_box(self, whole: ContactSurface) -> Mask:
+    def _pick_in_box(self, whole: ContactSurface) -> Mask:
         """Return which of all conditions (m,) are in the box ``part``, its faces included."""
         low, high = np.sort(np.asarray(self.part, dtype=float), axis=0)
         slack = DETERMINED * np.ptp(whole.points, axis=0).max()
         inside = (whole.points >= low - slack) & (whole.points <= high + slack)
         return np.asarray(np.all(inside, axis=1))
 
-    def _in_group(self, whole: ContactSurface) -> Mask:
+    def _pick_in_group(self, whole: ContactSurface) -> Mask:
         """Return which of all conditions (m,) are in the boundary group ``part``. Collective."""
         space: Any = self._problem.system.space
         comm = self._surface.comm
@@ -175,31 +184,37 @@ class Resultants:
         """Return the row of a state. Collective."""
         surface = self._surface
         part = self._part
+        d = part.dimension
+
+        # What the conditions of this rank have: reactions, displacements, slips and gaps, those of
+        # springs with their shortening.
         r_n = state.r_n
-        d = self._part.dimension
         u_n = surface.normal_values(state.u)
         slip = surface.slip(state.u, state.t)
         gap = surface.gap(state.t) - u_n + surface.compliance * r_n
 
-        # What adds up over the conditions: of this rank, then of all ranks in one message.
+        # What adds up over the conditions: of this rank, then of all ranks in one message. The part
+        # takes several states at once, of which this is one: [None].
         r_t = None if state.r_t is None else state.r_t[None]
-        forces = part.sums(r_n[None], r_t, state.active[None])[0]
+        forces = part.sum_up(r_n[None], r_t, state.active[None])[0]
         motion = u_n[part.mask] @ part.fit
         ends = r_n[part.mask] @ part.ends
         slid = np.einsum("k,kdc,kc->d", part.weights, part.tangents, slip[part.mask]) / part.whole
-        limit = [self._problem.friction.limit(r_n, surface.weights, 1.0)[part.mask].sum()]
-        sums = [forces, motion, ends, slid, limit]
-        everywhere = surface.comm.sum(np.concatenate(sums))
-        borders = np.cumsum([len(values) for values in sums[:-1]])
+        limit = self._problem.friction.limit(r_n, surface.weights, 1.0)[part.mask].sum()
+        own = [forces, motion, ends, slid, [limit]]
+        everywhere = surface.comm.sum(np.concatenate(own))
+        borders = np.cumsum([len(values) for values in own[:-1]])
         forces, motion, (low, high), slid, (limit,) = np.split(everywhere, borders)
 
         # Largest values, then the quantities that sums and largest values make.
-        tops = surface.comm.max(part.tops(gap[None], slip[None])[0])
-        quantities = part.quantities(forces[None], tops[None])
+        largest_values = surface.comm.max(part.find_largest(gap[None], slip[None])[0])
+        quantities = part.derive(forces[None], largest_values[None])
         row = {quantity: float(values[0]) for quantity, values in quantities.items()}
-        row |= dict(zip(_MOTIONS[d], motion.tolist(), strict=False))
-        across = [-part.normal[1], part.normal[0]] if d == 2 else None  # T points along it
-        sliding = np.linalg.norm(slid) if across is None else slid @ across
+
+        # The motion of the part, and what a report asks: the equations are in contact_parts.
+        row |= dict(zip(_MOTIONS[d], motion.tolist(), strict=False))  # on a line nothing has a name
+        along_t = [-part.normal[1], part.normal[0]] if d == 2 else None  # t̄ in the plane
+        sliding = np.linalg.norm(slid) if along_t is None else slid @ along_t
         row["level"] = (row["height"] - part.lowest) / part.tall if part.tall else np.nan
         row["sliding"] = float(sliding)
         row["pressure_low"] = float(low)

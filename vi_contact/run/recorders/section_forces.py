@@ -138,8 +138,17 @@ class SectionForces:
         """Find the cuts; return the row of the state at rest, of a static stage for example.
 
         Collective.
+
+        Args:
+            problem: what is marched.
+            state: the first state.
+            resumed: the last row of the run that is continued, None for a new run.
+
+        Raises:
+            InputError: a cut does not go through the cells.
         """
-        work = self._work = NodalWork("section forces", problem, self.loads, self.gravity)
+        work = NodalWork("section forces", problem, self.loads, self.gravity)
+        self._work = work
         cuts = [find_cut(work.space, label, ends, self.cells) for label, ends in self.cuts.items()]
         work.take([moved for moved, _ in cuts])
         self._turn = block_diag(np.zeros((0, 0)), *(turn for _, turn in cuts))

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from ...core.problem import ContactProblem
 from ...core.step import AXES, Columns, Report, Row, State
-from .columns import along_axes
+from .columns import expand_axes
 
 # Column -> (unit, meaning). One with {axis} in its name is recorded once for each axis.
 _STEPS_COLUMNS: Columns = {
@@ -27,7 +27,7 @@ class Steps:
 
     def columns(self) -> Columns:
         """Name t, k, iterations, certificate, escalated, a_g_x, and so on."""
-        return along_axes(_STEPS_COLUMNS, self._axes)
+        return expand_axes(_STEPS_COLUMNS, self._axes)
 
     def _row(
         self, state: State, iterations: int = 0, certificate: float = 0.0, escalated: bool = False
@@ -47,7 +47,13 @@ class Steps:
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Row:
-        """Return the initial row: no iterations and no certificate were needed, so zeros."""
+        """Return the initial row: no iterations and no certificate were needed, so zeros.
+
+        Args:
+            problem: what is marched.
+            state: the first state.
+            resumed: the last row of the run that is continued, None for a new run.
+        """
         self._problem = problem
         self._axes = AXES[: problem.system.influence.shape[1]]
         self._names = tuple(self.columns())

@@ -117,11 +117,13 @@ class CondensedFriction:
         active = closed > 0.0
 
         def solve(mu: Array, before: FrictionResult | None) -> FrictionResult:
+            """Solve the small problem of all conditions with coefficients mu."""
             guess = active if before is None else before.r
             return self._small.solve(q, cohesion, mu, guess)
 
         def slip_of(answer: FrictionResult) -> Array:
-            return self._slip(q, answer)[surface.slots]
+            """Return the slip of the conditions of this rank."""
+            return self._compute_slip(q, answer)[surface.slots]
 
         answer = self._rates.solve(step, rest, slope, solve, slip_of)
 
@@ -166,7 +168,7 @@ class CondensedFriction:
         rows = StepResult(x, r[..., 0].copy(), active, 0, self._name, r_t=r[..., 1:].copy())
         return Answers(rows, counts, failed, histories)
 
-    def _slip(self, q: Array, answer: FrictionResult) -> Array:
+    def _compute_slip(self, q: Array, answer: FrictionResult) -> Array:
         """Return B_t x - slip0 (m, d - 1) of points under pressure, zero where they stick."""
         moved = (self.delassus @ answer.r.ravel()).reshape(q.shape)
         w_t = q[:, 1:] + moved[:, 1:]

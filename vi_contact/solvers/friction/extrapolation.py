@@ -26,7 +26,7 @@ Next = Callable[[Array, Array], Array]  # x (n,) and its image g(x) -> the point
 DEPENDENT = 1e-10  # of the largest singular value: differences that others nearly combine to
 
 
-class Tried(NamedTuple):
+class Trial(NamedTuple):
     """Hold what is known of a point x that was tried."""
 
     f: Array  # g(x) - x
@@ -74,9 +74,10 @@ class Anderson:
     def start(self) -> Next:
         """Return the choice of the next point, which remembers the points of one iteration."""
         count = 0
-        points: list[Tried] = []
+        points: list[Trial] = []
 
         def choose_next(x: Array, image: Array) -> Array:
+            """Return the point (n,) to try after x, which has this image g(x)."""
             nonlocal count, points
             count += 1
             f = image - x
@@ -87,7 +88,7 @@ class Anderson:
                 f_old = points[-1].f
                 if float(f @ f_old) >= float(f_old @ f_old):
                     points = []
-            points.append(Tried(f, image.copy()))
+            points.append(Trial(f, image.copy()))
             if count <= self.after or len(points) < 2:
                 return image
 

@@ -16,7 +16,7 @@ from .newton import FrictionNewton
 from .problem import (
     FrictionMethod,
     FrictionResult,
-    Iterated,
+    LastIterate,
     ScaledDelassus,
     Settings,
     check_inner_method,
@@ -100,5 +100,5 @@ class PreparedFixedPoint:
             history.append(change / size)
             limit = np.maximum(unit * choose_next(limit / unit, new / unit), 0.0)
             answer = self._tresca.solve(q, limit, constant, answer.r)
-        iterated = Iterated(answer.r / scale, len(history) + 1, history)
-        return step.result(method, LOOSE * method.tolerance, iterated)
+        last = LastIterate(answer.r / scale, len(history) + 1, history)
+        return step.result(method, LOOSE * method.tolerance, last)

@@ -27,7 +27,7 @@ from .extrapolation import Extrapolation, Plain, check_extrapolation
 from .newton import FrictionNewton
 from .problem import (
     FrictionMethod,
-    Iterated,
+    LastIterate,
     PreparedFriction,
     ScaledDelassus,
     ScaledProblem,
@@ -74,10 +74,10 @@ class GivenForces(Settings):
         apart[:, ::d] = 0.0
         np.fill_diagonal(apart[::d, ::d], 1.0)
         tangential = self.tangential.prepare(apart, np.zeros_like(bilateral))
-        loop = partial(self._loop, normal, tangential)
+        loop = partial(self._iterate, normal, tangential)
         return PreparedFriction(self, LOOSE * self.tolerance, delassus, loop)
 
-    def _loop(self, normal: Any, tangential: Any, step: ScaledProblem, r: Array) -> Iterated:
+    def _iterate(self, normal: Any, tangential: Any, step: ScaledProblem, r: Array) -> LastIterate:
         """Alternate the two problems from r (m, d), which is overwritten.
 
         Args:
@@ -109,4 +109,4 @@ class GivenForces(Settings):
             if history[-1] <= self.tolerance:
                 break
             r[:, 1:] = choose_next(given.ravel(), r[:, 1:].ravel()).reshape(given.shape)
-        return Iterated(r, len(history), history)
+        return LastIterate(r, len(history), history)

@@ -173,19 +173,19 @@ class Reduced:
         # Pᵀ Gᵀ: rows of the unknowns that are entries of r, at the places of R.
         plain = len(self.plain)
         places = np.concatenate([self.plain, self._turned.ravel()])
-        part = _block(G, self.plain, places)
+        part = _take_block(G, self.plain, places)
 
         # To the row of a normal comes what its slip reaction adds.
         growth = self.growth[self.closed]  # of the first rows of part
         grows = np.flatnonzero(growth.any(axis=1))
         for k in range(self.shape[1] - 1):
             tied = np.flatnonzero(self.closed)[grows] * self.shape[1] + 1 + k
-            part[grows] += growth[grows, k, None] * _block(G, tied, places)
+            part[grows] += growth[grows, k, None] * _take_block(G, tied, places)
         if not len(self._turned):
             return part.T
 
         # Rows and columns of turns: the same across the slip; on the diagonal their own equation.
-        turned = _block(G, self._turned.ravel(), places).reshape(*self._turned.shape, -1)
+        turned = _take_block(G, self._turned.ravel(), places).reshape(*self._turned.shape, -1)
         part = np.vstack([part, np.einsum("ik,ikj->ij", self._across, turned)])
         across = part[:, plain:].reshape(len(part), *self._turned.shape)
         transpose = np.hstack([part[:, :plain], np.einsum("ik,jik->ji", self._across, across)])
@@ -215,7 +215,7 @@ class Factored:
         if is_large and MOST * len(delassus.matrix) < reduced.size < INVERTED:
             self._H = delassus.inverse
         if self._H is not None:
-            matrix = self._rest(self._H)
+            matrix = self._form_rest(self._H)
         else:
             transposed = delassus.matrix if delassus.symmetric else delassus.matrix.T
             matrix = reduced.matrix(transposed)
@@ -224,7 +224,7 @@ class Factored:
             self._lu = lu, pivots
             self.sound = info == 0
 
-    def _rest(self, H: Array) -> Array:
+    def _form_rest(self, H: Array) -> Array:
         """Return the matrix of (2), and note the other places and how they follow normals."""
         reduced = self.reduced
         left = np.ones(len(H), dtype=bool)
@@ -238,7 +238,7 @@ class Factored:
         self._normals = self._others // d * d
         self._growth = growth.ravel()[self._others]
         self._rows = H[self._others]
-        of_normals = _block(H, self._normals, self._others)
+        of_normals = _take_block(H, self._normals, self._others)
         return np.asarray(self._rows[:, self._others] - self._growth[:, None] * of_normals)
 
     def solve(self, right: Array) -> Array:
@@ -265,6 +265,6 @@ class Factored:
         return np.asarray(r)
 
 
-def _block(G: Array, rows: Indices, columns: Indices) -> Array:
+def _take_block(G: Array, rows: Indices, columns: Indices) -> Array:
     """Return G at rows and columns; in two steps, which is faster than in one."""
     return np.asarray(G[rows][:, columns])

@@ -34,7 +34,7 @@ from ...kernels.friction_sweeps import FrictionSweeps
 from .linear import Factored, LinearProblems, States
 from .nsgs import make_sweep
 from .problem import (
-    Iterated,
+    LastIterate,
     PreparedFriction,
     ScaledDelassus,
     ScaledProblem,
@@ -75,17 +75,17 @@ class FrictionNewton(Settings):
         # Compiled sweeps read half of G.
         loops = load_loops(SerialComm()) if delassus.symmetric else None
         short = delassus.make_short() if loops and delassus.count else None
-        loop = partial(self._loop, loops, short, {})
+        loop = partial(self._iterate, loops, short, {})
         return PreparedFriction(self, self.tolerance, delassus, loop)
 
-    def _loop(
+    def _iterate(
         self,
         loops: Any,
         short: ShortMatrices | None,
         factors: Factors,
         step: ScaledProblem,
         r: Array,
-    ) -> Iterated:
+    ) -> LastIterate:
         """Sweep, and let Newton end it; where Newton goes in circles, sweep and begin anew.
 
         Args:
@@ -97,17 +97,17 @@ class FrictionNewton(Settings):
         """
         history: list[float] = []
         if not step.unit > 0.0:
-            return Iterated(r, 0, history)
+            return LastIterate(r, 0, history)
         w = None
         if loops and short is not None:
             r, w, left = sweep_in_stages(loops, short, step, r)
             history.append(left / step.unit)
             if step.delassus.dimension > 2 and left <= step.rounding(r):
-                return Iterated(r, 1, history)
+                return LastIterate(r, 1, history)
         sweeps = 0
         for attempt in range(ATTEMPTS):
             y = r - (step.w(r) if w is None else w)
-            r, is_solved = self._newton(factors, step, y, history)
+            r, is_solved = self._run_newton(factors, step, y, history)
             if is_solved or attempt == ATTEMPTS - 1:
                 break
             sweep = make_sweep(step)
@@ -120,9 +120,9 @@ class FrictionNewton(Settings):
                 if not step.delassus.symmetric and not step.rounding(r) <= step.unit:
                     r = np.zeros_like(r)
                     break
-        return Iterated(r, len(history) + sweeps, history)
+        return LastIterate(r, len(history) + sweeps, history)
 
-    def _newton(
+    def _run_newton(
         self, factors: Factors, step: ScaledProblem, y: Array, history: list[float]
     ) -> tuple[Array, bool]:
         """Iterate by Newton's method until it solves the problem or comes back to old states.

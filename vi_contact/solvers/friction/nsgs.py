@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.algebra import Array, Mask
-from .problem import Iterated, PreparedFriction, ScaledDelassus, ScaledProblem, Settings
+from .problem import LastIterate, PreparedFriction, ScaledDelassus, ScaledProblem, Settings
 
 
 @dataclass(frozen=True)
@@ -38,9 +38,9 @@ class NSGS(Settings):
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedFriction:
         """Check and scale G (m d, m d); ``bilateral`` (m,) says which rows are bilateral."""
-        return PreparedFriction(self, self.tolerance, ScaledDelassus(G, bilateral), self._loop)
+        return PreparedFriction(self, self.tolerance, ScaledDelassus(G, bilateral), self._iterate)
 
-    def _loop(self, step: ScaledProblem, r: Array) -> Iterated:
+    def _iterate(self, step: ScaledProblem, r: Array) -> LastIterate:
         """Sweep from r until the residual is small, or rounding."""
         sweep = make_sweep(step)
         history: list[float] = []
@@ -51,7 +51,7 @@ class NSGS(Settings):
             goal = max(self.tolerance * step.unit, step.rounding(r))
             if not np.isfinite(residual) or residual <= goal:
                 break
-        return Iterated(r, len(history), history)
+        return LastIterate(r, len(history), history)
 
 
 def make_sweep(step: ScaledProblem) -> Callable[[Array], Array]:
@@ -61,6 +61,7 @@ def make_sweep(step: ScaledProblem) -> Callable[[Array], Array]:
     nodes = [_Node(step, i) for i in range(step.count)]
 
     def sweep(r: Array) -> Array:
+        """Solve for every node in turn, with the last reactions of all others."""
         flat = r.copy().ravel()
         for i, node in enumerate(nodes):
             rows = slice(i * d, (i + 1) * d)
@@ -101,6 +102,7 @@ class _Node:
 
         # Closed: w_n = 0 gives the pressure, which limits r_t; it sticks or slips.
         def pressure(r_t: Array) -> float:
+            """Return r_n of w_n = 0."""
             return float(-(q_n + self.coupling @ r_t) / self.normal)
 
         r_t = minimise_on_disk(
@@ -138,9 +140,11 @@ def minimise_on_disk(S: Array, q: Array, limit: Callable[[Array], float]) -> Arr
     unit = float(np.sum(np.abs(values)))
 
     def reaction(s: float) -> Array:
+        """Return r of (S + lambda) r = -q at s, in the eigenvectors of S."""
         return np.asarray(vectors @ (-s * part / (s * values + (1.0 - s) * unit)))
 
     def outside(s: float) -> float:
+        """Return by how much r is outside its disk."""
         r = reaction(s)
         return float(np.linalg.norm(r)) - limit(r)
 

@@ -36,14 +36,13 @@ from ...core.checks import provides
 from ...core.errors import InputError, StepFailure
 from ...core.quantities import Positive
 from ...laws.friction import project
-from ..normal.lcp import EPS, check_gap, energy_scale, scaled_matrix
+from ..normal.lcp import EPS, check_gap, compute_scale, scale_matrix
 
-FEW = 0.25  # of the unknowns: so many that carry something make a product by rows the faster one
-# of the points that stick: how many times the residual, or its rounding, their slip may be
-STILL = 4.0
+FEW = 0.25  # share of the unknowns that carry something, up to which a product by rows is faster
+STILL = 4.0  # how many times the residual, or its rounding, the slip of points that stick may be
 
 
-class Iterated(NamedTuple):
+class LastIterate(NamedTuple):
     """Hold where a method ended."""
 
     r: Array  # (m, d), scaled
@@ -210,19 +209,19 @@ class ScaledProblem:
             self._last[:] = [r.copy(), best * image]
         return r
 
-    def result(self, method: object, tolerance: float, iterated: Iterated) -> FrictionResult:
+    def result(self, method: object, tolerance: float, last: LastIterate) -> FrictionResult:
         """Judge where a method ended, and return the result in newtons.
 
         Args:
             method: its settings.
             tolerance: of the residual, that of r = 0 being 1.
-            iterated: where it ended.
+            last: where it ended.
 
         Raises:
             StepFailure: the residual is above the tolerance and above rounding.
         """
-        iterations = iterated.iterations
-        r = self.admissible(iterated.r)
+        iterations = last.iterations
+        r = self.admissible(last.r)
         w = self.w(r)
         residual = self.residual(r, w)
         unit = self.unit or 1.0
@@ -241,7 +240,7 @@ class ScaledProblem:
             iterations=iterations,
             residual=residual / unit,
             method=method,
-            history=tuple(iterated.history),
+            history=tuple(last.history),
         )
 
 
@@ -275,7 +274,7 @@ class ScaledDelassus:
                 f"the Delassus operator has shape {G.shape} for {m} points: give m d rows, node by "
                 "node"
             )
-        scale = energy_scale(G).reshape(m, d)
+        scale = compute_scale(G).reshape(m, d)
         if d > 1:  # one number for the tangents of a node: disks stay disks
             tangents = np.ascontiguousarray(scale[:, 1:])  # without gaps: see energy_scale
             mean = np.mean(tangents**-2.0, axis=1)
@@ -284,7 +283,7 @@ class ScaledDelassus:
         self.bilateral = bilateral.copy()
         self.count = m
         self.dimension = d
-        self.matrix, self.norm = scaled_matrix(G, scale.ravel(), unsymmetric=unsymmetric)
+        self.matrix, self.norm = scale_matrix(G, scale.ravel(), unsymmetric=unsymmetric)
         self.symmetric = not unsymmetric or np.array_equal(self.matrix, self.matrix.T)
 
     def product(self, r: Array) -> Array:
@@ -358,7 +357,7 @@ class PreparedFriction:
     method: object
     tolerance: float
     delassus: ScaledDelassus
-    loop: Callable[[ScaledProblem, Array], Iterated]
+    loop: Callable[[ScaledProblem, Array], LastIterate]
 
     def solve(
         self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None

@@ -57,8 +57,8 @@ class RateIteration:
         step: StepProblem,
         rest: FrictionLaw,
         mu: Array,
-        solved: Callable[[Array, Any], Any],
-        slip: Callable[[Any], Array],
+        solve_given: Callable[[Array, Any], Any],
+        slip_of: Callable[[Any], Array],
     ) -> Any:
         """Iterate over the coefficients. A law without rates is solved for once. Collective.
 
@@ -66,27 +66,27 @@ class RateIteration:
             step: the step.
             rest: its law at rest.
             mu: coefficients of all conditions under this law, to begin with.
-            solved: solves the problem of given coefficients, and begins from the last answer, None
-                at first.
-            slip: makes B_t x - slip0 (m, d - 1) of this rank from an answer.
+            solve_given: solves the problem of given coefficients, and begins from the last answer,
+                None at first.
+            slip_of: makes B_t x - slip0 (m, d - 1) of this rank from an answer.
 
         Returns:
-            The last answer of ``solved``.
+            The last answer of ``solve_given``.
 
         Raises:
             StepFailure: the tolerance is not reached.
         """
         if rest is step.friction:
-            return solved(mu, None)
+            return solve_given(mu, None)
         surface = step.surface
         choose_next = self.extrapolation.start()
         iterations = 0
         history: list[float] = []
         answer = None
         while len(history) < self.max_iterations:
-            answer = solved(mu, answer)
+            answer = solve_given(mu, answer)
             iterations += answer.iterations
-            law = step.friction_at(slip(answer))
+            law = step.friction_at(slip_of(answer))
             new = np.asarray(surface.everywhere(ask_slope(law, surface.weights)))
             size = max(max_abs(new), max_abs(mu))
             history.append(max_abs(new - mu) / size if size else 0.0)

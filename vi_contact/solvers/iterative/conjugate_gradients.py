@@ -16,7 +16,7 @@ import numpy as np
 from ...core.algebra import Array
 from ...core.errors import StepFailure
 from ..petsc import PETSc
-from ..volume.snes import Lent, weakly
+from ..volume.snes import LentContext, weakly
 from .operator import Operator
 from .preconditioners import Masked
 
@@ -78,7 +78,7 @@ class ConjugateGradients:
         self.ksp.setTolerances(max_it=np.iinfo(np.int32).max)
         self.ksp.setConvergenceTest(weakly(self._test))
         self.ksp.pc.setType("python")
-        self.ksp.pc.setPythonContext(Lent(masked))
+        self.ksp.pc.setPythonContext(LentContext(masked))
 
     def solve(self, residual: Array, x: Array, watch: Watch) -> tuple[Array, Array, int]:
         """Solve from x until the watch says stop. Collective.
@@ -110,7 +110,9 @@ class ConjugateGradients:
         )
 
 
-def cg_failure(name: str, reason: int, iterations: int, history: Sequence[float]) -> StepFailure:
+def make_cg_failure(
+    name: str, reason: int, iterations: int, history: Sequence[float]
+) -> StepFailure:
     """Return the error of a solver that stopped without an answer.
 
     Args:

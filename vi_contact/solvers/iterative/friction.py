@@ -1,12 +1,20 @@
 """Solve a step with friction by semismooth Newton on all unknowns.
 
-Closed normals and sticking tangents are a mask.
+Closed normals and sticking tangents are held: they are a mask on the full-size vectors, and the
+residual in their rows is the reaction, r = b - A x. With the states of the points (open, stick,
+slip) one step of a time scheme goes
 
-Every Newton step solves the linear problem of the present states (``friction_states``) by GMRES
-(``friction_krylov``), to a hundredth of its residual. The first states are those of the reactions
-of the last step, with the slip that the step predicts: A x - b at a predicted x is no contact
-force. In the end every residual is formed afresh; reactions are put on their cone, and tangents
-that stick where they were.
+1. ``_predict_states``: the states of the reactions of the step before, with the slip that this step
+   predicts. A x - b at a predicted x is no contact force, so that it cannot tell them.
+2. ``_apply_states``: put what is held into x, and form the residual.
+3. ``judge``: end where the error is below the goal; the law may take other coefficients.
+4. ``advance``: solve the linear problem of the states (``friction_states``) by GMRES
+   (``friction_krylov``), to a hundredth of its residual; take the states at the new x; go to 2.
+5. ``answer``: reactions are put on their cone, and tangents that stick where they were.
+
+Where the states go in circles, limits or coefficients of friction are given for some rounds: a
+*round* ends where x solves the step with those that are given, and takes new ones. Vectors are
+padded to whole nodes (``layout``).
 """
 
 from typing import NamedTuple
@@ -23,21 +31,20 @@ from .contact import ClosedSet
 from .friction_krylov import Gmres, TurnedInverse
 from .friction_states import LawOfStep, Limits, States, Tangents
 from .layout import Layout
-from .measures import Measured, Worth
+from .measures import StepMeasure, Worth
 from .operator import Operator
 from .preconditioners import Inverse
 
-SHARE = 1e-2  # of the residual of a linear problem that GMRES may leave
-AHEAD = 0.1  # of what Newton's last step left: it leaves less and less
-# of the largest friction limit: residual at which coefficients that are given are taken anew
-ROUND = 1e-4
-CIRCLES = 15  # Newton steps after which limits are given
-GIVEN = 8  # rounds for which they are at first, and for twice as many every time after
-MOST_GIVEN = 256  # such rounds
-STEPS = 150  # of Newton
+SHARE = 1e-2  # of the residual of a linear problem that GMRES may leave, or less:
+AHEAD = 0.1  # of the factor by which Newton's last step has lowered the residual
+ROUND = 1e-4  # of the largest friction limit: residual at which a round ends
+CIRCLES = 15  # Newton steps after which limits or coefficients are given
+GIVEN = 8  # rounds for which they are at first, and for twice as many every time after,
+MOST_GIVEN = 256  # up to so many
+STEPS = 150  # of Newton, at most
 
 
-class Contacts(NamedTuple):
+class LastContact(NamedTuple):
     """Hold what the next step begins with: reactions and slip of the answer of this one."""
 
     r_n: Array  # (m,)
@@ -92,7 +99,7 @@ class FrictionSolver:
         self.tangents = Tangents(surface, layout.places, diagonal)
         turned = TurnedInverse(inverse.pc, operator.blocks.createVecLeft(), self.tangents)
         self.gmres = Gmres(self.comm, operator, contact, turned, patience)
-        self.last: Contacts | None = None
+        self.last: LastContact | None = None
         self.worth = Worth(surface.comm, 3, tolerance)
 
     def solve(self, step: StepProblem) -> StepResult:
@@ -130,15 +137,15 @@ class FrictionNewtonStep:
         self.law = LawOfStep(step)
         assert step.slip0 is not None
         self.slip0 = step.slip0
-        self.b = solver.layout.padded(step.b)
-        self.measured = Measured(step, self.b)
+        self.b = solver.layout.pad(step.b)
+        self.measure = StepMeasure(step, self.b)
         self.history: list[float] = []
         self.steps = 0
-        self._newton_steps = 0  # since limits or coefficients were given last
-        self._rounds = GIVEN
+        self._newton_steps = 0  # with the step's own law, since something was given last
+        self._rounds = GIVEN  # for which limits or coefficients are given next
         solver.contact.begin(step)
         solver.inverse.begin()
-        self.x = solver.layout.padded(step.guess)
+        self.x = solver.layout.pad(step.guess)
         self._apply_states(self._predict_states())
 
     def _predict_states(self) -> States:
@@ -149,20 +156,24 @@ class FrictionNewtonStep:
         solver = self.solver
         tangents = solver.tangents
         closed = solver.contact.closed
-        slip = self._slip_at_x()
+        slip = self._compute_slip()
+
+        # No reactions are known: y = c slip alone, which would let all points slip.
         if solver.last is None:
             none = np.zeros(len(slip))
             limits = self.law(np.zeros_like(slip), none, none)
             y_t = tangents.c[:, None] * slip
             stuck = closed & (limits.slope > 0.0)
             return States(tangents, limits, (none, y_t), slip, stuck=stuck)
+
+        # y = r + c slip with the last reactions; points that stuck under pressure stick again.
         last = solver.last
         r_n = np.where(closed, last.r_n, 0.0)
         y_t = last.r_t + tangents.c[:, None] * slip
         stuck = closed & ~np.any(last.slip, axis=1) & (last.r_n > 0.0)
-        return States(tangents, self._limits(slip, r_n, y_t), (r_n, y_t), slip, stuck=stuck)
+        return States(tangents, self._find_limits(slip, r_n, y_t), (r_n, y_t), slip, stuck=stuck)
 
-    def _slip_at_x(self) -> Array:
+    def _compute_slip(self) -> Array:
         """Return B_t x - slip0 (m, d - 1), zero where a tangent is prescribed."""
         solver = self.solver
         moved = solver.tangents.values(self.x) - self.slip0
@@ -205,17 +216,17 @@ class FrictionNewtonStep:
         """Form the residual at x, and what follows from it."""
         solver = self.solver
         self.residual = self.load - (solver.operator @ self.x)
-        self.scales = self.measured(solver.contact, self.x, self.residual, self.load)
+        self.scales = self.measure(solver.contact, self.x, self.residual, self.load)
         self.r_n = solver.contact.reactions(self.x, self.residual)
         self.r_t = solver.tangents.values(self.residual)
-        self.slip = self._slip_at_x()
-        self.limits = self._limits(self.slip, self.r_n, self.r_t)
+        self.slip = self._compute_slip()
+        self.limits = self._find_limits(self.slip, self.r_n, self.r_t)
 
-    def _limits(self, slip: Array, r_n: Array, y_t: Array) -> Limits:
+    def _find_limits(self, slip: Array, r_n: Array, y_t: Array) -> Limits:
         """Return the friction limits at a slip, for points that y_t would move from rest."""
         return self.law(slip, r_n, np.linalg.norm(y_t, axis=1) / self.solver.tangents.c)
 
-    def _friction_on_cone(self) -> Array:
+    def _put_on_cone(self) -> Array:
         """Return the friction (m, d - 1) that the law allows next to r_t.
 
         It is along the slip where that is certain, and the projection of y_t elsewhere.
@@ -247,18 +258,19 @@ class FrictionNewtonStep:
 
         # The residual of free rows; in the rows of tangents, what r_t misses of the law.
         error = np.where(solver.contact.weights() > 0.0, self.residual, 0.0)
-        error[tangents.rows] = tangents.flatten(self.r_t - self._friction_on_cone())
-        wrong = self._wrong_signs(0.0)
+        error[tangents.rows] = tangents.flatten(self.r_t - self._put_on_cone())
+        wrong = self._find_wrong_signs(0.0)
         local = np.array(
             [max_abs(error), np.any(wrong), max_abs(self.limits(self.r_n))], dtype=float
         )
         sizes = solver.comm.max(np.where(np.isnan(local), np.inf, local))
         self.error, any_wrong, limit = sizes
 
+        # How small the error has to be, from what x and the reactions have changed by.
         force = self.scales.force
         self.history.append(self.error / force if 0.0 < force < np.inf else self.error)
         if not np.isfinite(self.error):
-            raise self._failure(*REASONS[NOT_A_NUMBER])
+            raise self._make_failure(*REASONS[NOT_A_NUMBER])
         self.goal = solver.worth.goal(
             self.error, self.scales, self.x, self.r_n, self.r_t, begin=self.steps == 0
         )
@@ -266,14 +278,16 @@ class FrictionNewtonStep:
             return True
 
         # An answer with given coefficients or limits need not be exact: the next ones come sooner.
+        # The error with them is another, and is judged at once.
         is_round_done = not any_wrong and self.error <= max(ROUND * limit, self.goal)
         if not self.law.settled and is_round_done:
             self.law.advance(self.slip, self.r_n)
-            self.limits = self._limits(self.slip, self.r_n, self.r_t)
+            self.limits = self._find_limits(self.slip, self.r_n, self.r_t)
             return self.judge()
 
+        # x does not solve the step: refuse, or see to it that Newton does not go in circles.
         if self.steps == STEPS:
-            raise self._failure(
+            raise self._make_failure(
                 "the states of friction did not settle", "take a smaller step of time or load"
             )
         if self.law.settled:
@@ -290,7 +304,7 @@ class FrictionNewtonStep:
         self._newton_steps = 0
         self._rounds = min(2 * self._rounds, MOST_GIVEN)
 
-    def _wrong_signs(self, error: float) -> Mask:
+    def _find_wrong_signs(self, error: float) -> Mask:
         """Return the conditions (m,) whose signs are wrong by more than the error of the residual.
 
         The error is in the unit of forces.
@@ -322,15 +336,15 @@ class FrictionNewtonStep:
             share = min(SHARE, AHEAD * self.history[-1] / self.history[-2])
         dx, left, reason = solver.gmres.solve(residual, share, 0.5 * self.goal)
         if reason < 0:
-            raise self._failure(*REASONS.get(reason, GMRES_BROKE_DOWN))
+            raise self._make_failure(*REASONS.get(reason, GMRES_BROKE_DOWN))
 
         solver.operator.work.newton_steps += 1
         self.steps += 1
         self.x += dx
         self._update_residual()
-        self._apply_states(*self._states_at_x(left))
+        self._apply_states(*self._update_states(left))
 
-    def _states_at_x(self, error: float) -> tuple[States, Mask]:
+    def _update_states(self, error: float) -> tuple[States, Mask]:
         """Return the states at x, and the conditions (m,) that close or open with them.
 
         The error is what the linear problem left of its residual.
@@ -338,7 +352,7 @@ class FrictionNewtonStep:
         solver = self.solver
         contact = solver.contact
         tangents = solver.tangents
-        wrong = self._wrong_signs(0.0 if error <= self.goal else error)
+        wrong = self._find_wrong_signs(0.0 if error <= self.goal else error)
 
         # y_n is r_n; of a condition that closes it is what presses it back onto its bound.
         stiffness = np.where(contact.soft, contact.k, contact.diagonal)
@@ -347,10 +361,10 @@ class FrictionNewtonStep:
         contact.change(wrong)
 
         y_t = self.r_t + tangents.c[:, None] * self.slip
-        limits = self._limits(self.slip, y_n, y_t)
+        limits = self._find_limits(self.slip, y_n, y_t)
         return States(tangents, limits, (y_n, y_t), self.slip, before=self.states), wrong
 
-    def answer(self) -> tuple[StepResult, Contacts]:
+    def answer(self) -> tuple[StepResult, LastContact]:
         """Return the result, and what the next step begins with."""
         solver = self.solver
         contact = solver.contact
@@ -359,13 +373,13 @@ class FrictionNewtonStep:
         # Reactions on their cone: no tension but of bilateral conditions, r_t as the law allows.
         pulls = ~contact.bilateral & (self.r_n < 0.0)
         self.r_n = np.where(pulls, 0.0, self.r_n)
-        r_t = self._friction_on_cone()
+        r_t = self._put_on_cone()
 
         # Tangents that stick go exactly where the slip is zero.
         y_t = self.r_t + tangents.c[:, None] * self.slip
         limit = self.limits(self.r_n)
         still = (np.linalg.norm(y_t, axis=1) <= limit) & (limit > 0.0)
-        x = solver.layout.stripped(self.x)
+        x = solver.layout.strip(self.x)
         held = (solver.surface.tangents >= 0) & still[:, None]
         x[solver.surface.tangents[held]] = self.slip0[held]
         slip = np.where(still[:, None], 0.0, self.slip)
@@ -380,9 +394,9 @@ class FrictionNewtonStep:
             history=tuple(self.history),
             aim=solver.tolerance,
         )
-        return result, Contacts(self.r_n, r_t, slip)
+        return result, LastContact(self.r_n, r_t, slip)
 
-    def _failure(self, words: str, remedy: str) -> StepFailure:
+    def _make_failure(self, words: str, remedy: str) -> StepFailure:
         """Return the error of a step without an answer, with the history of residuals."""
         return StepFailure(
             f"{self.solver.name} stopped after {self.steps} Newton steps, {words} (residuals "

@@ -19,7 +19,7 @@ import numpy as np
 
 from ...core.algebra import Array, Comm, largest
 from ..petsc import PETSc
-from ..volume.snes import Lent
+from ..volume.snes import LentContext
 from .conjugate_gradients import SOLVED, STAGNATED
 from .contact import ClosedSet
 from .friction_states import States, Tangents, dot
@@ -56,8 +56,14 @@ class TurnedInverse(Masked):
         self._less_across = 1.0 - np.sqrt(g / (g + states.kappa))
         self._states = states
 
-    def apply(self, pc: Any, r: Any, z: Any) -> None:
-        """Apply w W M⁻¹ W w to r, and write it into z: PETSc vectors."""
+    def apply(self, _pc: Any, r: Any, z: Any) -> None:
+        """Apply w W M⁻¹ W w, as PETSc calls a shell preconditioner.
+
+        Args:
+            _pc: PETSc's preconditioner, whose context this object is.
+            r: the PETSc vector to which it is applied.
+            z: the PETSc vector that gets the result.
+        """
         np.multiply(self.weights, r.array_r, out=self._r.array)
         self._turn(self._r.array)
         self._inverse.apply(self._r, z)
@@ -108,7 +114,7 @@ class Gmres:
         self._contact = contact
         self._patience = patience
         sizes = operator.blocks.getSizes()
-        shell = PETSc.Mat().createPython(sizes, Lent(self), comm=operator.blocks.comm)
+        shell = PETSc.Mat().createPython(sizes, LentContext(self), comm=operator.blocks.comm)
         shell.setUp()
         self._b, self._x = shell.createVecs()
         self.cg = self._make_solver("cg", shell)
@@ -123,7 +129,7 @@ class Gmres:
         ksp.setType(kind)
         ksp.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
         ksp.pc.setType("python")
-        ksp.pc.setPythonContext(Lent(self._turned))
+        ksp.pc.setPythonContext(LentContext(self._turned))
         return ksp
 
     def apply_states(self, states: States) -> None:
@@ -134,7 +140,13 @@ class Gmres:
         self._slips = bool(largest(self._comm, np.any(states.slips)))
 
     def mult(self, _shell: Any, x: Any, y: Any) -> None:
-        """Apply the matrix of the linear problem to x, and write it into y: PETSc vectors."""
+        """Apply the matrix of the linear problem, as the product of a PETSc shell matrix.
+
+        Args:
+            _shell: PETSc's matrix, whose context this object is.
+            x: the PETSc vector that is multiplied.
+            y: the PETSc vector that gets the product.
+        """
         self._operator.mult(None, x, y)
         values = y.array
         self._states.apply(self._contact, x.array_r, values)

@@ -240,7 +240,7 @@ class LawOfStep:
         """End a round: give the coefficients of this slip (m, d - 1), or the limits of r_n (m,)."""
         if self._rounds_of_limit:
             self._rounds_of_limit -= 1
-            self._given_limit = self._limits_at(slip)(r_n)
+            self._given_limit = self._find_limits(slip)(r_n)
         else:
             self._given_slip = slip
             self._rounds_of_slip -= 1
@@ -256,7 +256,7 @@ class LawOfStep:
             r_n: (m,), the present one.
         """
         if self._constant:
-            self._given_limit = self._limits_at(slip)(r_n)
+            self._given_limit = self._find_limits(slip)(r_n)
             self._rounds_of_limit = rounds
         else:
             self._given_slip = np.zeros_like(slip)
@@ -275,21 +275,21 @@ class LawOfStep:
             none = np.zeros_like(self._given_limit)
             return Limits(self._given_limit, none, none)
         if self._constant or self._rounds_of_slip:
-            return self._limits_at(self._given_slip)
+            return self._find_limits(self._given_slip)
 
         # The derivative with the slip, by a difference; only the size of the slip counts.
-        here = self._limits_at(slip)
-        rest = self._limits_at(np.zeros_like(slip))
+        here = self._find_limits(slip)
+        rest = self._find_limits(np.zeros_like(slip))
         size = np.linalg.norm(slip, axis=1)
         moved = size > 0.0
         h = DIFFERENCE * np.where(moved, size, reach)
         further = np.column_stack([size + h, *np.zeros_like(slip.T[1:])])
-        change = self._limits_at(further)(r_n) - here(r_n)
+        change = self._find_limits(further)(r_n) - here(r_n)
         rise = np.where(h > 0.0, change, 0.0) / np.where(h > 0.0, h, 1.0)
         rise = np.where(moved, rise, np.maximum(rise, 0.0))
         return Limits(here.cohesion, here.slope, rise, rest)
 
-    def _limits_at(self, slip: Array) -> Limits:
+    def _find_limits(self, slip: Array) -> Limits:
         """Return the limits under the coefficients of a slip (m, d - 1)."""
         step = self._step
         none = np.zeros(step.surface.count)

@@ -15,7 +15,7 @@ import scipy.sparse as sp
 
 from ...core.algebra import Array, EffectiveMatrix, Indices, largest, take_upper_blocks
 from ..petsc import PETSc
-from ..volume.bounded_system import assembled
+from ..volume.bounded_system import convert_to_aij
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Layout:
     size: int
     complete: bool
 
-    def padded(self, x: Array) -> Array:
+    def pad(self, x: Array) -> Array:
         """Return the values of all components of the nodes, a copy.
 
         They are zero where there is no unknown.
@@ -45,7 +45,7 @@ class Layout:
         values[self.places] = x
         return values
 
-    def stripped(self, values: Array) -> Array:
+    def strip(self, values: Array) -> Array:
         """Return the values of the unknowns; a copy."""
         return np.array(values) if self.complete else values[self.places]
 
@@ -55,7 +55,7 @@ class Layout:
         return np.setdiff1d(np.arange(self.size), self.places)
 
 
-def layout_of(A: EffectiveMatrix) -> Layout:
+def find_layout(A: EffectiveMatrix) -> Layout:
     """Return the layout of the unknowns of A; one unknown a block where nothing is known of nodes.
 
     Collective.
@@ -80,12 +80,12 @@ class Nodewise:
     def __init__(self, A: EffectiveMatrix) -> None:
         """Make the layout of A. Collective."""
         self.A = A
-        self.layout = layout_of(A)
+        self.layout = find_layout(A)
 
     @cached_property
     def source(self) -> Any:
         """Return A as AIJ."""
-        return assembled(self.A)
+        return convert_to_aij(self.A)
 
     def blocks(self) -> Any:
         """Return A in symmetric blocks (SBAIJ), or its own AIJ where blocks have one entry.
@@ -105,7 +105,7 @@ class Nodewise:
             return stored
 
         # Otherwise the blocks on and above the diagonal are copied.
-        mat = assembled(self.A) if layout.complete else self.entries()
+        mat = convert_to_aij(self.A) if layout.complete else self.entries()
         indptr, columns, values = mat.getValuesCSR()
         rows = sp.csr_matrix((values, columns, indptr), shape=(layout.size, mat.getSize()[1]))
         ends, columns, values = take_upper_blocks(rows, d, mat.getOwnershipRange()[0])

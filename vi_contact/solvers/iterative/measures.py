@@ -1,6 +1,8 @@
 """Measure an iterate as the certificate of the step will (``core.verify``).
 
-It takes reductions of a few numbers.
+A residual is small or large only beside the forces of the step, a displacement beside the largest
+one. ``StepMeasure`` gives these references at an iterate, ``Worth`` the residual below which a
+better one is not worth its products. Each costs a reduction of a few numbers.
 """
 
 from dataclasses import dataclass
@@ -36,7 +38,7 @@ class Measures:
     round_off: float
 
 
-class Measured:
+class StepMeasure:
     """Measure the iterates of one step."""
 
     def __init__(self, step: StepProblem, load: Array) -> None:
@@ -73,8 +75,13 @@ class Measured:
 class Worth:
     """Estimate how small a residual has to be for the accuracy that is asked for.
 
-    x and reactions are to be known to ``tolerance`` of the largest so far. It is estimated from
-    what they changed by since it was larger. What the last step showed of the conditioning is kept.
+    x and reactions are to be known to ``tolerance`` of the largest so far. An iterate with the
+    residual rho was wrong in a part p of the answer by about |p_new - p|, where p_new has at most
+    half of this residual. The residual to come to is then
+
+        tolerance · min over the parts of  size(p) rho / |p_new - p|
+
+    What the last step showed of the conditioning is kept.
     """
 
     def __init__(self, comm: Comm, parts: int, tolerance: float) -> None:

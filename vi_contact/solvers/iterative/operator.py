@@ -7,7 +7,7 @@ import numpy as np
 
 from ...core.algebra import Array, Indices
 from ..petsc import PETSc
-from ..volume.snes import Lent
+from ..volume.snes import LentContext
 
 
 @dataclass
@@ -53,7 +53,13 @@ class Operator:
         self._stiffness = stiffness
 
     def mult(self, _shell: Any, x: Any, y: Any) -> None:
-        """Apply A + K_s to x, and write it into y: PETSc vectors."""
+        """Apply A + K_s, as the product of a PETSc shell matrix.
+
+        Args:
+            _shell: PETSc's matrix, whose context this object is.
+            x: the PETSc vector that is multiplied.
+            y: the PETSc vector that gets the product.
+        """
         self.work.products += 1
         self.blocks.mult(x, y)
         if len(self._rows):
@@ -70,6 +76,8 @@ class Operator:
 
         PETSc does not hold the operator: its clean-up loses whatever only its contexts kept alive.
         """
-        mat = PETSc.Mat().createPython(self.blocks.getSizes(), Lent(self), comm=self.blocks.comm)
+        mat = PETSc.Mat().createPython(
+            self.blocks.getSizes(), LentContext(self), comm=self.blocks.comm
+        )
         mat.setUp()
         return mat

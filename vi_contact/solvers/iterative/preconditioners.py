@@ -23,7 +23,7 @@ from ...core.errors import InputError
 from ...core.surfaces import ContactSurface
 from ...laws.mass_transfer import rigid_motions
 from ..petsc import PETSc
-from ..volume.failures import last_line
+from ..volume.failures import read_last_line
 from ..volume.options import OptionLayers, Options
 from .layout import Layout, Nodewise
 from .operator import Work
@@ -50,7 +50,7 @@ DEFAULTS: dict[str, Options] = {
 OVERLAP: Options = {"pc_type": "asm", "pc_asm_type": "basic"}  # of one layer
 
 
-def courant(A: EffectiveMatrix) -> float:
+def compute_courant(A: EffectiveMatrix) -> float:
     """Return C; NaN when A does not know what inertia is in it. Collective.
 
     With A = m M + c C + k K the number
@@ -70,7 +70,7 @@ def courant(A: EffectiveMatrix) -> float:
     return float(np.sqrt(max(total - inertia, 0.0) / inertia)) if inertia > 0.0 else float("inf")
 
 
-def choose(number: float, modes: bool) -> str:
+def choose_kind(number: float, modes: bool) -> str:
     """Return the preconditioner for a Courant number.
 
     It is Jacobi up to 0.5, ICC up to 30 or where the number is not known, GAMG beyond. ``modes``
@@ -88,7 +88,7 @@ def defaults(kind: str, ranks: int) -> Options:
     return DEFAULTS[kind]
 
 
-def shares(inverse: Any, template: Any) -> Array:
+def compute_shares(inverse: Any, template: Any) -> Array:
     """Return 1/sqrt(k) of every row: k subdomains of a PETSc preconditioner hold it. Collective.
 
     Subdomains are counted by an application to ones, with copies in the place of their factors.
@@ -123,7 +123,7 @@ class Masked:
         self._inverse = inverse
         self._r = template.duplicate()
         self._z = template.duplicate()
-        self._shares = shares(inverse, template)
+        self._shares = compute_shares(inverse, template)
         self._weights = self._shares
 
     @property
@@ -136,7 +136,13 @@ class Masked:
         self._weights = weights * self._shares
 
     def apply(self, _pc: Any, r: Any, z: Any) -> None:
-        """Apply w M⁻¹ w to r, and write it into z: PETSc vectors."""
+        """Apply w M⁻¹ w, as PETSc calls a shell preconditioner.
+
+        Args:
+            _pc: PETSc's preconditioner, whose context this object is.
+            r: the PETSc vector to which it is applied.
+            z: the PETSc vector that gets the result.
+        """
         np.multiply(self.weights, r.array_r, out=self._r.array)
         self._inverse.apply(self._r, z)
         z.array[:] *= self.weights
@@ -205,7 +211,9 @@ class Multigrid(Inverse):
         self._comm = surface.comm
         self._matrix = nodewise.entries()
         if nodewise.A.space is not None:
-            modes = rigid_modes(nodewise.A, surface, nodewise.layout, self._matrix.createVecLeft())
+            modes = make_rigid_modes(
+                nodewise.A, surface, nodewise.layout, self._matrix.createVecLeft()
+            )
             self._matrix.setNearNullSpace(
                 PETSc.NullSpace().create(vectors=modes, comm=self._matrix.comm)
             )
@@ -268,12 +276,12 @@ def make_preconditioner(matrix: Any, layers: OptionLayers) -> Any:
         except PETSc.Error as error:
             raise InputError(
                 f"PETSc makes no preconditioner of the options under {layers.prefix} "
-                f"({last_line(error)}): correct or drop them"
+                f"({read_last_line(error)}): correct or drop them"
             ) from error
     return pc
 
 
-def rigid_modes(
+def make_rigid_modes(
     A: EffectiveMatrix, surface: ContactSurface, layout: Layout, template: Any
 ) -> list[Any]:
     """Return orthonormal PETSc vectors of the rigid motions. Collective.
@@ -302,7 +310,7 @@ def rigid_modes(
         unknowns = surface.in_frames(mode)  # T⁻¹ u
         if surface.coupling is not None:
             unknowns = 2.0 * unknowns - surface.coupling @ unknowns  # R⁻¹ = 2 - R
-        vector.array[:] = layout.padded(unknowns)
+        vector.array[:] = layout.pad(unknowns)
     return orthonormalise(vectors)
 
 

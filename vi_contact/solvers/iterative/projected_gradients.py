@@ -1,13 +1,19 @@
 """Solve a step by projected conjugate gradients on all unknowns (MPRGP).
 
-It serves after a search that went in circles.
+It serves after a search that went in circles, and minimises
 
-min ½ rᵀG r + qᵀr over r >= lower (Z. Dostál, Optimal Quadratic Programming Algorithms, Springer
-2009, algorithm 5.8). With g = q + G r, the free gradient is phi = g where r is off its bound, and
-the chopped gradient beta = min(g, 0) where it is on it. As long as beta is small beside phi, go on
-with conjugate gradients on the present face; a step that would leave the bounds is cut there and
-followed by a projected gradient step of fixed length (expansion); otherwise release rows along
--beta (proportioning). The energy falls in every step, so that it cannot cycle.
+    ½ rᵀG r + qᵀr  over  r >= lower
+
+(Z. Dostál, Optimal Quadratic Programming Algorithms, Springer 2009, algorithm 5.8). With the
+gradient g = q + G r, the free gradient phi is g where r is off its bound, and the chopped gradient
+beta is min(g, 0) where it is on it; elsewhere they are zero. One of three steps is taken:
+
+- as long as beta is small beside phi, a conjugate gradient step on the present face of the bounds;
+- where that would leave the bounds it is cut there, and followed by a projected gradient step of
+  fixed length, which brings others onto theirs (*expansion*);
+- where beta is large, rows are released along -beta (*proportioning*).
+
+The energy falls in every step, so that it cannot cycle.
 
 Here r = -D^½ x with D the diagonal of A and of the closed springs, so that x <= bound is a lower
 bound and lengths and forces compare; on a face the preconditioner of the route is used. The springs
@@ -25,8 +31,8 @@ from .search import FALL, Search
 
 ROUNDS = 50  # of springs that open and close
 PROPORTION = 1.0  # of beta to phi; any positive number works, 1 is Dostál's choice
-# of the expansion, in units of 1/‖G‖: less than 2 converges; the rest is for the error of the
-# estimate
+# length of the expansion, in units of 1/‖G‖: less than 2 converges; the rest is for the error of
+# the estimate of ‖G‖
 STEP = 1.5
 HALVINGS = 50  # of the interval in which the search along a line finds its minimum
 
@@ -82,15 +88,23 @@ class BoundedMinimum:
         return self._root * masked(self._root * phi)
 
     def solve(self, x: Array) -> tuple[Array, int]:
-        """Return (x, reason) of the descent from x.
+        """Descend from x, until the goal of the step is reached.
 
-        The closed set of ``contact`` is then that of x.
+        Args:
+            x: padded; what penetrates is put onto its bound before.
+
+        Returns:
+            The minimum x, padded, and SOLVED, or why there is none. The closed set of ``contact``
+            is then that of x: points that are on their bound.
         """
+        # Scale, r = -D^½ x, and begin on the face that x is on.
         contact = self.search.contact
         x = contact.project(x)
         start = np.maximum(-self._root * x, self.lower)
         face = Face(self, start, self.apply(start) + self.q, self._step)
         reason = self._descend(face)
+
+        # Scale back; bounds are then met exactly.
         x = -face.r / self._root
         closed = ~face.free[self._rows]
         x[self._rows[closed]] = self._bound[closed]
@@ -98,12 +112,20 @@ class BoundedMinimum:
         return x, reason
 
     def _descend(self, face: "Face") -> int:
-        """Advance until the projected gradient is as small as the measures of the step ask for."""
+        """Advance until the projected gradient is as small as the measures of the step ask for.
+
+        Args:
+            face: where it begins; it holds the iterate.
+
+        Returns:
+            SOLVED; STAGNATED when the gradient has not fallen tenfold for too long; NOT_A_NUMBER.
+        """
         search = self.search
-        mark = np.inf  # the goal is taken anew whenever the gradient has fallen below
-        since = 0
+        mark = np.inf  # the goal is taken anew whenever the gradient has fallen below,
+        since = 0  # which it did last at this count
         count = 0
         while True:
+            # The projected gradient phi + beta, in the unit of forces.
             gradient = np.abs(self._root * (face.phi + face.beta))
             norm = largest(search.comm, np.max(gradient, initial=0.0))
             if not np.isfinite(norm):
@@ -161,9 +183,12 @@ class Face:
 
     def advance(self) -> None:
         """Take one step: conjugate gradient or expansion on the face, or proportioning off it."""
+        # The iterate is "proportional" where beta is small beside phi, of which only that part
+        # counts which a step of fixed length could use before it meets the bounds: then there is
+        # still something to gain on the face.
         dot = self._problem.dot
         room = (self.r - self._problem.lower) / self._step
-        reduced = np.minimum(room, self.phi)  # what a fixed step could really use
+        reduced = np.minimum(room, self.phi)
         if dot(self.beta, self.beta) <= PROPORTION**2 * dot(reduced, self.phi):
             self._explore()
         else:
@@ -174,12 +199,16 @@ class Face:
         problem = self._problem
         p = self._direction
         lower = problem.lower
-        image, curvature = self._curvature(p)
+
+        # The length of the conjugate gradient step r - length p, and the largest one that stays
+        # within the bounds, of all ranks.
+        image, curvature = self._measure_curvature(p)
         length = problem.dot(self.gradient, p) / curvature
         blocking = p > 0.0
         steps = (self.r - lower)[blocking] / p[blocking]
         feasible = -largest(problem.search.comm, -np.min(steps, initial=np.inf))
         if length <= feasible:
+            # The next direction: z = M⁻¹ phi, less its part that is not conjugate to p.
             self._place(np.maximum(self.r - length * p, lower), self.gradient - length * image)
             z = problem.precondition(self.phi, self.free)
             self._direction = z - (problem.dot(z, image) / curvature) * p
@@ -194,12 +223,12 @@ class Face:
 
     def _release(self) -> None:
         """Proportioning: go down along -beta, which takes entries off their bound."""
-        image, curvature = self._curvature(self.beta)
+        image, curvature = self._measure_curvature(self.beta)
         length = self._problem.dot(self.gradient, self.beta) / curvature
         self._place(self.r - length * self.beta, self.gradient - length * image)
         self._restart()
 
-    def _curvature(self, p: Array) -> tuple[Array, float]:
+    def _measure_curvature(self, p: Array) -> tuple[Array, float]:
         """Return G p and pᵀG p."""
         image = self._problem.apply(p)
         curvature = self._problem.dot(p, image)
@@ -212,7 +241,7 @@ class Indefinite(Exception):
     """Say that A is not positive definite."""
 
 
-def largest_eigenvalue(search: Search, diagonal: Array, rounds: int = 15) -> float:
+def estimate_largest_eigenvalue(search: Search, diagonal: Array, rounds: int = 15) -> float:
     """Return the largest eigenvalue of D⁻¹A, too large by 5 %. Collective.
 
     It is found by power iteration, from below; without the springs.
@@ -234,9 +263,7 @@ def largest_eigenvalue(search: Search, diagonal: Array, rounds: int = 15) -> flo
     return 1.05 * max(value, 1.0)
 
 
-def projected_gradients(
-    search: Search, diagonal: Array, norm: float, x: Array
-) -> tuple[Array, Array, int]:
+def descend(search: Search, diagonal: Array, norm: float, x: Array) -> tuple[Array, Array, int]:
     """Solve a step from x. Collective.
 
     Args:
@@ -268,13 +295,13 @@ def projected_gradients(
 
         # Springs are wrong: go towards it as far as the energy falls, and close those of there.
         x = contact.project(x)
-        x = x + _length(search, x, target - x) * (target - x)
+        x = x + _search_line(search, x, target - x) * (target - x)
         contact.close_springs(x)
         search.take_set()
     return x, residual, STAGNATED
 
 
-def _length(search: Search, x: Array, d: Array) -> float:
+def _search_line(search: Search, x: Array, d: Array) -> float:
     """Return the t in (0, 1] at which the energy is smallest along d. Collective.
 
     The energy is ½ xᵀA x - bᵀx + sum ½ k max(x - bound, 0)², and t a zero of its slope, found by
@@ -285,12 +312,15 @@ def _length(search: Search, x: Array, d: Array) -> float:
         x: padded, where the line begins.
         d: padded, where it leads.
     """
+    # The slope of the part without one-sided springs is linear in t: two residuals give it.
     contact = search.contact
     contact.close_springs(None)
     search.take_set()
     here = search.load - (search.operator @ x)
     there = search.load - (search.operator @ (x + d))
     slope, curvature = search.comm.sum(np.array([-(d @ here), d @ (here - there)]))
+
+    # That of the springs is monotone, and so is the sum: halve the interval that has its zero.
     low = 0.0
     high = 1.0
     for _ in range(HALVINGS):

@@ -26,9 +26,9 @@ from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
 from ..certified import check_laws
 from ..petsc import PETSc
-from ..volume.failures import petsc_failure
+from ..volume.failures import make_petsc_failure
 from ..volume.options import OptionLayers
-from .conjugate_gradients import SOLVED, WRONG_SIGNS, ConjugateGradients, cg_failure
+from .conjugate_gradients import SOLVED, WRONG_SIGNS, ConjugateGradients, make_cg_failure
 from .contact import ClosedSet
 from .friction import FrictionSolver
 from .layout import Nodewise
@@ -42,11 +42,11 @@ from .preconditioners import (
     Inverse,
     Masked,
     Multigrid,
-    choose,
-    courant,
+    choose_kind,
+    compute_courant,
     defaults,
 )
-from .projected_gradients import largest_eigenvalue, projected_gradients
+from .projected_gradients import descend, estimate_largest_eigenvalue
 from .search import Search, search_set
 
 log = logging.getLogger(__name__)
@@ -159,9 +159,9 @@ class PreparedIterative:
 
     def _choose_preconditioner(self, A: EffectiveMatrix) -> str:
         """Return the preconditioner, and write it into the log. Collective."""
-        number = courant(A)
+        number = compute_courant(A)
         asked = self._settings.preconditioner
-        kind = choose(number, A.space is not None) if asked == AUTO else asked
+        kind = choose_kind(number, A.space is not None) if asked == AUTO else asked
         if A.algebra.comm.rank == 0:
             overlaps = kind == ICC and A.algebra.comm.size > 1
             log.info(
@@ -217,7 +217,7 @@ class PreparedIterative:
             if error.__cause__ is not None:
                 # raised in one of our callbacks; PETSc before 3.22 passes it on
                 raise error.__cause__ from None
-            raise petsc_failure(self._name, error) from error
+            raise make_petsc_failure(self._name, error) from error
 
     @cached_property
     def _friction(self) -> FrictionSolver:
@@ -248,7 +248,7 @@ class PreparedIterative:
         before = self.work.linear_iterations
         search = Search(
             step,
-            layout.padded(step.b),
+            layout.pad(step.b),
             contact,
             operator=self._operator,
             masked=self._masked,
@@ -258,19 +258,19 @@ class PreparedIterative:
             patience=settings.patience,
         )
         x, residual, changes, reason = search_set(
-            search, self._cg, layout.padded(step.guess), settings.changes
+            search, self._cg, layout.pad(step.guess), settings.changes
         )
         if reason == WRONG_SIGNS:
             self.work.fallbacks += 1
             if self._norm is None:
-                self._norm = largest_eigenvalue(search, self._diagonal)
-            x, residual, reason = projected_gradients(search, self._diagonal, self._norm, x)
+                self._norm = estimate_largest_eigenvalue(search, self._diagonal)
+            x, residual, reason = descend(search, self._diagonal, self._norm, x)
         if reason != SOLVED:
             iterations = self.work.linear_iterations - before
-            raise cg_failure(self._name, reason, iterations, search.history)
+            raise make_cg_failure(self._name, reason, iterations, search.history)
         self._worth.keep()
         return StepResult(
-            x=layout.stripped(x),
+            x=layout.strip(x),
             r_n=contact.reactions(x, residual),
             active=contact.closed.copy(),
             iterations=changes,

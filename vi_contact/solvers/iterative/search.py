@@ -19,7 +19,7 @@ from ...core.algebra import Array, Comm, Mask, largest, total
 from ...core.step import StepProblem
 from .conjugate_gradients import NOT_A_NUMBER, SOLVED, STAGNATED, WRONG_SIGNS, ConjugateGradients
 from .contact import ClosedSet
-from .measures import Measured, Worth, largest_free
+from .measures import StepMeasure, Worth, largest_free
 from .operator import Operator
 from .preconditioners import Inverse, Masked
 
@@ -71,11 +71,13 @@ class Search:
         self.b = b
         self.tolerance = tolerance
         self.patience = patience
-        self.measured = Measured(step, b)
+        self.measure = StepMeasure(step, b)
         self.worth = worth
         self.goal = 0.0
         self.history: list[float] = []
-        self._sets: set[float] = set()
+        self._sets: set[float] = set()  # fingerprints of the sets that were taken
+        self._mark = np.inf  # residual below which the signs are looked at next
+        self._since = 0  # iteration of the last look
         contact.begin(step)
         inverse.begin()
         self.take_set()
@@ -112,6 +114,10 @@ class Search:
         norm = largest_free(self.comm, residual, self.masked.weights)
         if not np.isfinite(norm):
             return NOT_A_NUMBER
+
+        # Look at x and the signs at the first iteration, and whenever the residual has fallen
+        # tenfold, or to the goal. A sign that is wrong by more than the residual ends the solve: it
+        # would not come right.
         if iteration == 0 or norm <= max(self.goal, self._mark):
             x = solution()
             self.look(norm, x, residual, iteration)
@@ -119,6 +125,8 @@ class Search:
                 return SOLVED
             if iteration and largest(self.comm, np.any(self.wrong_signs(x, residual, norm))):
                 return WRONG_SIGNS
+
+        # Go on, unless the residual has not fallen tenfold for too long.
         if iteration - self._since < self.patience:
             return 0
         self.look(norm, solution(), residual, iteration)
@@ -135,7 +143,7 @@ class Search:
         """
         self._mark = FALL * norm
         self._since = iteration
-        self.scales = self.measured(self.contact, x, residual, self.load)
+        self.scales = self.measure(self.contact, x, residual, self.load)
         reactions = self.contact.reactions(x, residual)
         self.goal = self.worth.goal(norm, self.scales, x, reactions, begin=iteration == 0)
         force = self.scales.force
@@ -163,7 +171,7 @@ class Search:
         It costs one product. Collective.
         """
         residual = self.load - (self.operator @ x)
-        self.scales = self.measured(self.contact, x, residual, self.load)
+        self.scales = self.measure(self.contact, x, residual, self.load)
         return residual, largest_free(self.comm, residual, self.masked.weights)
 
     def is_certain(self, norm: float) -> bool:
@@ -174,7 +182,8 @@ class Search:
         """Close and open conditions. Collective.
 
         It takes a product where a rigid support closes, and moves x there. One that opens leaves
-        the residual as it is, and springs change it in their rows alone.
+        the residual as it is, which in its row was the reaction, and springs change it in their
+        rows alone.
 
         Args:
             wrong: (m,) the conditions that change sides.
@@ -199,7 +208,7 @@ class Search:
 def search_set(
     search: Search, cg: ConjugateGradients, x: Array, changes: int
 ) -> tuple[Array, Array, int, int]:
-    """Search the contact set from x. Collective.
+    """Search the contact set from x, by solves on one set after another. Collective.
 
     Args:
         search: the step.
@@ -211,9 +220,10 @@ def search_set(
         x, its residual, the number of changes, and the reason: SOLVED, or PETSc's for stopping, or
         WRONG_SIGNS when a set came twice or the set changed too often.
     """
+    # Put what the predicted set holds onto its bounds; the residual there is the reaction.
     contact = search.contact
-    count = 0
-    refinements = 0
+    count = 0  # changes of the set
+    refinements = 0  # solves that began from a residual formed afresh
     contact.place(x)
     residual = search.load - (search.operator @ x)
     while True:
@@ -223,6 +233,8 @@ def search_set(
             return x, residual, count, reason
 
         # A residual that is carried along drifts from the true one: form it afresh, go on from it.
+        # The signs are then judged without allowance; those of an unfinished solve may be wrong by
+        # as much as its residual.
         error = 0.0
         if reason == SOLVED:
             residual, fresh = search.form_residual(x)

@@ -28,7 +28,16 @@ from ...core.errors import ViContactError
 from ...core.quantities import Positive
 from ...kernels.compiler import load_loops
 from ...kernels.exchanges import Exchanges
-from .lcp import EPS, Found, LCPResult, PreparedLCP, ScaledLCP, cholesky, failure, scaled_dense
+from .lcp import (
+    EPS,
+    LCPResult,
+    PreparedLCP,
+    ScaledAnswer,
+    ScaledLCP,
+    factorise,
+    make_failure,
+    scale_dense,
+)
 
 FEW = 160  # rows up to which compiled exchanges are as fast as those of LAPACK
 KEPT = 2**22  # numbers in the factors of sets that are remembered
@@ -67,8 +76,8 @@ class ActiveSet:
         Raises:
             InputError: G is not symmetric and positive definite.
         """
-        scaled = scaled_dense(G, bilateral)
-        cholesky(scaled.matrix)  # if the whole is positive definite, so is every part
+        scaled = scale_dense(G, bilateral)
+        factorise(scaled.matrix)  # if the whole is positive definite, so is every part
         return PreparedSets(self, scaled, _Sets(self, scaled).search)
 
 
@@ -155,7 +164,7 @@ class _Sets:
         self._bilateral = scaled.bilateral
         self._factors: dict[bytes, _Factor] = {}
 
-    def search(self, gap: Array, guess: Array | Mask | None, unit: float) -> Found:
+    def search(self, gap: Array, guess: Array | Mask | None, unit: float) -> ScaledAnswer:
         """Search the set without wrong signs.
 
         Args:
@@ -176,8 +185,8 @@ class _Sets:
         elif residual > self.method.tolerance:
             advice = "G is too ill-conditioned: remove contacts that nearly depend on others"
         else:
-            return Found(r, residual, len(history), history)
-        raise failure(self.method, iterations=len(history), residual=residual, advice=advice)
+            return ScaledAnswer(r, residual, len(history), history)
+        raise make_failure(self.method, iterations=len(history), residual=residual, advice=advice)
 
     def _exchange(self, active: Mask, gap: Array, history: list[float]) -> tuple[Array, Array]:
         """Exchange all rows with wrong signs, until there are none.
@@ -194,8 +203,8 @@ class _Sets:
         fewest = gap.size + 1
         patience = PATIENCE
         while True:
-            r, w = self._on_set(active, gap)
-            wrong = self._wrong(active, r, w)
+            r, w = self._solve_on_set(active, gap)
+            wrong = self._find_wrong(active, r, w)
             count = np.count_nonzero(wrong)
             if count == 0:
                 return self._cut(r, w, gap)
@@ -227,7 +236,7 @@ class _Sets:
         """
         active = (r > 0.0) | self._bilateral
         while True:
-            target, w = self._on_set(active, gap)
+            target, w = self._solve_on_set(active, gap)
             leaving = active & ~self._bilateral & (target < 0.0)
             if leaving.any():
                 # On the way to the minimum on the set reactions vanish: go as far as the first.
@@ -238,7 +247,7 @@ class _Sets:
             else:
                 # The minimum on the set is reached: admit the row with the worst gap.
                 r = target
-                if not self._wrong(active, r, w).any():
+                if not self._find_wrong(active, r, w).any():
                     return r, w
                 change = np.arange(r.size) == np.argmin(np.where(active, np.inf, w))
             history.append(float(np.count_nonzero(change)))
@@ -246,7 +255,7 @@ class _Sets:
                 return r, w
             active = active ^ change
 
-    def _on_set(self, active: Mask, gap: Array) -> tuple[Array, Array]:
+    def _solve_on_set(self, active: Mask, gap: Array) -> tuple[Array, Array]:
         """Return r and w with w = 0 on the set and r = 0 off it."""
         key = active.tobytes()
         factor = self._factors.pop(key, None)
@@ -258,7 +267,7 @@ class _Sets:
             del self._factors[next(iter(self._factors))]
         return factor.solve(gap)
 
-    def _wrong(self, active: Mask, r: Array, w: Array) -> Mask:
+    def _find_wrong(self, active: Mask, r: Array, w: Array) -> Mask:
         """Return the rows (m,) whose sign is wrong by more than rounding.
 
         Grazing rows (r = w = 0) are right on either side.
@@ -291,7 +300,7 @@ class _Factor:
     def __init__(self, active: Mask, matrix: Array) -> None:
         self._index = active.nonzero()[0]
         self._rows = matrix[self._index]
-        self._lower = cholesky(self._rows[:, self._index]) if self._index.size else None
+        self._lower = factorise(self._rows[:, self._index]) if self._index.size else None
 
     def solve(self, gap: Array) -> tuple[Array, Array]:
         """Return r (m,) with r = 0 off the set, and w = gap + G r.

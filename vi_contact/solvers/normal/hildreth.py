@@ -18,7 +18,7 @@ from scipy.linalg import lapack
 from ...core.algebra import Array, Mask, max_abs
 from ...core.arguments import check_fields
 from ...core.quantities import Positive
-from .lcp import EPS, Found, PreparedLCP, ScaledLCP, cholesky, failure, scaled_dense
+from .lcp import EPS, PreparedLCP, ScaledAnswer, ScaledLCP, factorise, make_failure, scale_dense
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Hildreth:
         Raises:
             InputError: G is not symmetric and positive definite.
         """
-        scaled = scaled_dense(G, bilateral)
+        scaled = scale_dense(G, bilateral)
         return PreparedLCP(self, scaled, _Sweeps(self, scaled).search)
 
 
@@ -69,10 +69,10 @@ class _Sweeps:
         """Form H: the scaled G, or in the primal form its inverse, scaled once more."""
         self.method = method
         self._scaled = scaled
-        factor = cholesky(scaled.matrix)
+        factor = factorise(scaled.matrix)
         bilateral = scaled.bilateral
         if method.primal:
-            self._H, self._unit = _inverse(factor)
+            self._H, self._unit = _invert(factor)
             swept = np.flatnonzero(~bilateral)  # in bilateral rows s = -q
         else:
             self._H = scaled.matrix
@@ -80,7 +80,7 @@ class _Sweeps:
             swept = np.arange(bilateral.size)
         self._rows = [(i, self._H[i]) for i in swept.tolist()]
 
-    def search(self, gap: Array, guess: Array | Mask | None, unit: float) -> Found:
+    def search(self, gap: Array, guess: Array | Mask | None, unit: float) -> ScaledAnswer:
         """Sweep until the answer is found.
 
         Args:
@@ -93,29 +93,31 @@ class _Sweeps:
         """
         scaled = self._scaled
         method = self.method
-        lower = self._lower(gap)
-        x = self._start(gap, lower, guess)
-        gradient = self._gradient(x, gap)
+        lower = self._find_bounds(gap)
+        x = self._choose_start(gap, lower, guess)
+        gradient = self._form_gradient(x, gap)
         history: list[float] = []
         for sweeps in range(1, method.max_sweeps + 1):
             change = sweep(self._rows, x, lower, gradient)
             if method.record:
-                history.append(self._objective(x, gap))
+                history.append(self._evaluate_objective(x, gap))
             x_max = max(abs(value) for value in x)
             if change > method.tolerance * x_max and sweeps < method.max_sweeps:
                 continue
 
             # x has settled: judge it by its residual. The gradient is formed afresh, as the updates
             # of a sweep accumulate rounding errors.
-            gradient = self._gradient(x, gap)
-            r = self._reaction(np.array(x), np.array(lower), gradient)
+            gradient = self._form_gradient(x, gap)
+            r = self._recover_reaction(np.array(x), np.array(lower), gradient)
             error = scaled.complementarity(r, gap + scaled.matrix @ r)
-            if error <= max(method.tolerance * unit, self._rounding(x, r)):
-                return Found(r, error / unit, sweeps, history)
+            if error <= max(method.tolerance * unit, self._bound_rounding(x, r)):
+                return ScaledAnswer(r, error / unit, sweeps, history)
         advice = "the contacts are strongly coupled: use ActiveSet, or the other form of Hildreth"
-        raise failure(method, iterations=method.max_sweeps, residual=error / unit, advice=advice)
+        raise make_failure(
+            method, iterations=method.max_sweeps, residual=error / unit, advice=advice
+        )
 
-    def _lower(self, gap: Array) -> list[float]:
+    def _find_bounds(self, gap: Array) -> list[float]:
         """Return the lower bounds of x: -q of s, or 0 of r, in unilateral rows."""
         if self.method.primal:
             lower = -gap / self._unit
@@ -123,7 +125,9 @@ class _Sweeps:
             lower = np.where(self._scaled.bilateral, -np.inf, 0.0)
         return list(lower.tolist())
 
-    def _start(self, gap: Array, lower: list[float], guess: Array | Mask | None) -> list[float]:
+    def _choose_start(
+        self, gap: Array, lower: list[float], guess: Array | Mask | None
+    ) -> list[float]:
         """Return x to start from.
 
         Args:
@@ -137,12 +141,12 @@ class _Sweeps:
         s = np.maximum(self._scaled.matrix @ r / self._unit, lower)
         return list(np.where(self._scaled.bilateral, lower, s).tolist())
 
-    def _gradient(self, x: list[float], gap: Array) -> Array:
+    def _form_gradient(self, x: list[float], gap: Array) -> Array:
         """Return H x + c (m,)."""
         image: Array = self._H @ np.array(x)
         return image if self.method.primal else gap + image
 
-    def _reaction(self, x: Array, lower: Array, gradient: Array) -> Array:
+    def _recover_reaction(self, x: Array, lower: Array, gradient: Array) -> Array:
         """Return the scaled r (m,).
 
         It is x itself, or r = D s where s is at its bound (elsewhere r = 0 by complementarity).
@@ -157,7 +161,7 @@ class _Sweeps:
         r = gradient / self._unit
         return np.where(self._scaled.bilateral, r, np.where(x == lower, np.maximum(r, 0.0), 0.0))
 
-    def _objective(self, x: list[float], gap: Array) -> float:
+    def _evaluate_objective(self, x: list[float], gap: Array) -> float:
         """Return ½ xᵀHx + cᵀx."""
         values = np.array(x)
         quadratic = 0.5 * float(values @ (self._H @ values))
@@ -166,7 +170,7 @@ class _Sweeps:
         carried = values != 0.0  # elsewhere q may be infinite
         return quadratic + float(values[carried] @ gap[carried])
 
-    def _rounding(self, x: list[float], r: Array) -> float:
+    def _bound_rounding(self, x: list[float], r: Array) -> float:
         """Return the gap that the form in use cannot tell from zero.
 
         In the primal form w = q + G D s has passed through both G and D.
@@ -204,7 +208,7 @@ def sweep(
     return largest_change
 
 
-def _inverse(factor: Array) -> tuple[Array, Array]:
+def _invert(factor: Array) -> tuple[Array, Array]:
     """Return D = G⁻¹ scaled to unit diagonal, e D e, and e = D_ii^(-1/2)."""
     triangle = lapack.dpotri(factor, lower=1)[0] if factor.size else factor
     inverse = np.tril(triangle) + np.tril(triangle, -1).T

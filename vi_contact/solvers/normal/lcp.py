@@ -33,7 +33,7 @@ EPS = float(np.finfo(float).eps)
 SYMMETRIC = 1e-8  # entries of the scaled G that differ by less are equal
 
 
-class Found(NamedTuple):
+class ScaledAnswer(NamedTuple):
     """Hold the answer of a method, in scaled numbers."""
 
     r: Array  # (m,)
@@ -138,7 +138,7 @@ class PreparedLCP:
 
     method: object
     scaled: ScaledLCP
-    search: Callable[[Array, Array | Mask | None, float], Found]
+    search: Callable[[Array, Array | Mask | None, float], ScaledAnswer]
 
     def solve(self, q: ArrayLike, guess: ArrayLike | None = None) -> LCPResult:
         """Solve the problem of q.
@@ -164,7 +164,7 @@ class PreparedLCP:
             )
         gap = q * scaled.scale
         unit = scaled.violation(gap)
-        nothing = Found(np.zeros(q.size), 0.0, 0, ())
+        nothing = ScaledAnswer(np.zeros(q.size), 0.0, 0, ())
         answer = self.search(gap, guess, unit) if unit else nothing
         return LCPResult(
             r=answer.r * scaled.scale,
@@ -176,7 +176,7 @@ class PreparedLCP:
         )
 
 
-def scaled_dense(G: Array, bilateral: Mask, *, unsymmetric: bool = False) -> ScaledLCP:
+def scale_dense(G: Array, bilateral: Mask, *, unsymmetric: bool = False) -> ScaledLCP:
     """Check and scale a dense G.
 
     Args:
@@ -191,11 +191,11 @@ def scaled_dense(G: Array, bilateral: Mask, *, unsymmetric: bool = False) -> Sca
     if not isinstance(G, np.ndarray):
         raise InputError("this method needs the Delassus operator as an array: form it")
     check_operator(G, bilateral)
-    d = energy_scale(G, signed=unsymmetric)
-    return ScaledLCP(d, *scaled_matrix(G, d, unsymmetric=unsymmetric), bilateral.copy())
+    d = compute_scale(G, signed=unsymmetric)
+    return ScaledLCP(d, *scale_matrix(G, d, unsymmetric=unsymmetric), bilateral.copy())
 
 
-def scaled_matrix(G: Array, d: Array, *, unsymmetric: bool = False) -> tuple[Array, float]:
+def scale_matrix(G: Array, d: Array, *, unsymmetric: bool = False) -> tuple[Array, float]:
     """Return d G d, exactly symmetric where it is so to 1e-8, and its norm.
 
     Args:
@@ -217,7 +217,7 @@ def scaled_matrix(G: Array, d: Array, *, unsymmetric: bool = False) -> tuple[Arr
     return matrix, float(np.abs(matrix).sum(axis=1).max(initial=0.0))
 
 
-def energy_scale(G: Array, *, signed: bool = False) -> Array:
+def compute_scale(G: Array, *, signed: bool = False) -> Array:
     """Return d = |G_ii|^(-1/2) (m,).
 
     Args:
@@ -245,7 +245,7 @@ def energy_scale(G: Array, *, signed: bool = False) -> Array:
     return diagonal**-0.5
 
 
-def cholesky(G: Array) -> Array:
+def factorise(G: Array) -> Array:
     """Return the lower Cholesky factor (LAPACK dpotrf).
 
     Raises:
@@ -286,7 +286,7 @@ def check_gap(q: Array, bilateral: Mask) -> None:
         )
 
 
-def failure(method: object, *, iterations: int, residual: float, advice: str) -> StepFailure:
+def make_failure(method: object, *, iterations: int, residual: float, advice: str) -> StepFailure:
     """Return the error of a method that did not reach its tolerance.
 
     Args:

@@ -26,7 +26,7 @@ from ...core.arguments import check_fields
 from ...core.errors import InputError, StepFailure
 from ...core.matrix_checks import probe
 from ...core.quantities import Positive
-from .lcp import EPS, Found, PreparedLCP, ScaledLCP, failure, scaled_dense
+from .lcp import EPS, PreparedLCP, ScaledAnswer, ScaledLCP, make_failure, scale_dense
 
 TINY = 1e-11  # of the largest entry of a column: no pivot
 TIED = 1e-13  # ratios that rounding alone may tell apart
@@ -63,7 +63,7 @@ class Lemke:
         Raises:
             InputError: the bilateral rows depend on each other.
         """
-        scaled = scaled_dense(G, bilateral, unsymmetric=True)
+        scaled = scale_dense(G, bilateral, unsymmetric=True)
         return PreparedLCP(self, scaled, _Pivots(self, scaled).search)
 
 
@@ -84,7 +84,7 @@ class _Pivots:
         self._carry = np.linalg.solve(G[np.ix_(b, b)].T, G[:, b].T).T
         self._matrix = G - self._carry @ G[b]
 
-    def search(self, gap: Array, guess: Array | Mask | None, unit: float) -> Found:
+    def search(self, gap: Array, guess: Array | Mask | None, unit: float) -> ScaledAnswer:
         """Try the guessed set, or that of guessed reactions; where it is wrong, pivot.
 
         Args:
@@ -97,18 +97,18 @@ class _Pivots:
                 tolerance.
         """
         history: list[float] = []
-        r, residual = self._on_set(gap < 0.0 if guess is None else guess > 0, gap)
+        r, residual = self._solve_on_set(gap < 0.0 if guess is None else guess > 0, gap)
         # The rounding of a huge r would allow anything, so that the tolerance has to hold as well.
         if residual > min(self._scaled.rounding(r), self.method.tolerance * unit):
-            r, residual = self._on_set(self._pivot(gap, unit, history), gap)
+            r, residual = self._solve_on_set(self._pivot(gap, unit, history), gap)
         if not residual <= self.method.tolerance * unit:
             advice = "G is too ill-conditioned: remove contacts that nearly depend on others"
-            raise failure(
+            raise make_failure(
                 self.method, iterations=len(history), residual=residual / unit, advice=advice
             )
-        return Found(r, residual / unit, len(history), history)
+        return ScaledAnswer(r, residual / unit, len(history), history)
 
-    def _on_set(self, active: Mask, gap: Array) -> tuple[Array, float]:
+    def _solve_on_set(self, active: Mask, gap: Array) -> tuple[Array, float]:
         """Return r >= 0 with w = 0 on the set and bilateral rows, and its residual.
 
         The residual is infinite where there is no such r, or more than one.
@@ -153,7 +153,7 @@ class _Pivots:
         leaving = -1
         while leaving != z:
             if len(history) == self.method.max_iterations:
-                raise failure(
+                raise make_failure(
                     self.method,
                     iterations=len(history),
                     residual=history[-1],
@@ -170,12 +170,12 @@ class _Pivots:
             # The complement of what left enters next.
             entering = (leaving + m) % z
             if leaving != z:
-                row = _leaving_row(tableau, basis, entering, len(history))
+                row = _choose_leaving_row(tableau, basis, entering, len(history))
         closed[rows[basis[basis >= m] - m]] = True
         return closed
 
 
-def _leaving_row(tableau: Array, basis: Indices, entering: int, pivots: int) -> int:
+def _choose_leaving_row(tableau: Array, basis: Indices, entering: int, pivots: int) -> int:
     """Return the row that is first at zero when a variable enters.
 
     Of several it is that of z, or the lexicographic minimum.

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...core.algebra import Array
 from ...core.checks import array
-from .lcp import EPS, check_operator, energy_scale
+from .lcp import EPS, check_operator, compute_scale
 
 MOST = 18  # rows: 2^18 pivots, a tenth of a second
 NONE = "is no P-matrix, a principal minor is not positive: contact may have no solution or several"
@@ -48,7 +48,7 @@ def p_matrix(G: Array) -> PMatrix:
         return PMatrix(False, NONE)
 
     # The symmetric part, scaled to a diagonal of ones.
-    d = energy_scale(G)
+    d = compute_scale(G)
     matrix = d[:, None] * G * d
     norm = float(np.abs(matrix).sum(axis=1).max(initial=0.0))
     if np.linalg.eigvalsh(0.5 * (matrix + matrix.T)).min(initial=1.0) > len(G) * EPS * norm:
@@ -74,7 +74,7 @@ def p_matrix(G: Array) -> PMatrix:
             return PMatrix(False, NONE)
         is_positive = first > error
         is_sure = is_sure and bool(is_positive.all())
-        complements, doubts = _complements(matrices[is_positive], errors[is_positive])
+        complements, doubts = _form_complements(matrices[is_positive], errors[is_positive])
         matrices = np.concatenate([matrices[:, 1:, 1:], complements])
         errors = np.concatenate([errors[:, 1:, 1:], doubts])
     if is_sure:
@@ -85,7 +85,7 @@ def p_matrix(G: Array) -> PMatrix:
 
 
 @np.errstate(all="ignore")  # entries that overflow decide nothing
-def _complements(matrices: Array, errors: Array) -> tuple[Array, Array]:
+def _form_complements(matrices: Array, errors: Array) -> tuple[Array, Array]:
     """Return the Schur complements of the first entries of many matrices.
 
     Args:

@@ -128,12 +128,12 @@ class BoundedSystem:
             largest = float(matrix.mat.norm(PETSc.NormType.NORM_INFINITY))  # type: ignore[attr-defined]
         return largest + 2.0 * float(self.max(np.max(self.spring, initial=0.0))[0])
 
-    def assembled(self) -> Any:
+    def assemble(self) -> Any:
         """Return A with its springs as an AIJ matrix. Collective.
 
         It is the given matrix when that is PETSc's and there are no springs.
         """
-        mat = assembled(self.A)
+        mat = convert_to_aij(self.A)
         if not self.surface.some(self.soft):
             return mat
 
@@ -148,18 +148,19 @@ class BoundedSystem:
         remote = np.concatenate([body.col, first + feet, first + tips, first + feet, first + tips])
         k = self.spring
         entries = np.concatenate([body.data, k, -k, -k, k])
-        return aij(sp.csr_matrix((entries, (local, remote)), shape=(self.size, total)), self.comm)
+        rows = sp.csr_matrix((entries, (local, remote)), shape=(self.size, total))
+        return make_aij(rows, self.comm)
 
 
-def assembled(A: EffectiveMatrix) -> Any:
+def convert_to_aij(A: EffectiveMatrix) -> Any:
     """Return A as PETSc's AIJ matrix, its own where it has one."""
     matrix = A.matrix
     if isinstance(matrix, SerialMatrix):
-        return aij(matrix.csr, PETSc.COMM_SELF)
+        return make_aij(matrix.csr, PETSc.COMM_SELF)
     return matrix.mat  # type: ignore[attr-defined]
 
 
-def aij(rows: sp.csr_matrix, comm: Any) -> Any:
+def make_aij(rows: sp.csr_matrix, comm: Any) -> Any:
     """Return the square AIJ matrix with these rows of this rank. Collective.
 
     Columns are numbered over all ranks.

@@ -54,7 +54,7 @@ GENERAL_ADVICE = (
 )
 
 
-def name_of(reasons: type, reason: int) -> str:
+def find_name(reasons: type, reason: int) -> str:
     """Return the name of a reason, such as DIVERGED_MAX_IT; of several the longest.
 
     ``reasons`` is petsc4py's class of them.
@@ -67,7 +67,7 @@ def name_of(reasons: type, reason: int) -> str:
     return max(names, key=len, default=f"reason {reason}")
 
 
-def reason_failure(
+def make_reason_failure(
     method: str, reasons: type, reason: int, iterations: int, worst: float
 ) -> StepFailure:
     """Return the error of a solver that stopped without an answer.
@@ -79,7 +79,7 @@ def reason_failure(
         iterations: so far.
         worst: relative residual.
     """
-    name = name_of(reasons, reason)
+    name = find_name(reasons, reason)
     words = MEANING.get(name, "no convergence")
     return StepFailure(
         f"{method} stopped after {iterations} iterations with relative residual {worst:.2g}, "
@@ -87,9 +87,9 @@ def reason_failure(
     )
 
 
-def petsc_failure(method: str, error: Any) -> StepFailure:
+def make_petsc_failure(method: str, error: Any) -> StepFailure:
     """Return the error of a method in which a call of PETSc raised one."""
-    words = last_line(error)
+    words = read_last_line(error)
     code: Any = getattr(error, "ierr", "unknown")
     advice = ERRORS.get(code, UNKNOWN)
     # error 72, "Inf or NaN", or 83, "generated infinity or NaN"
@@ -99,6 +99,6 @@ def petsc_failure(method: str, error: Any) -> StepFailure:
     return StepFailure(f"{method} stopped with PETSc error {code} ({words}): {advice}")
 
 
-def last_line(error: Any) -> str:
+def read_last_line(error: Any) -> str:
     """Return the end of PETSc's trace, which says what is wrong."""
     return str(error).splitlines()[-1].split("] ", 1)[-1].strip()

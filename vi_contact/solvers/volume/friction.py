@@ -84,13 +84,15 @@ class VolumeFriction:
         slope = surface.everywhere(ask_slope(rest, surface.weights))
 
         def solve(mu: Array, before: Solution | None) -> Solution:
+            """Solve the step with the coefficients mu of all conditions."""
             return self._solve_sequence(step, cohesion, mu[surface.slots], before)
 
         def slip_of(solution: Solution) -> Array:
+            """Return the slip of the conditions of this rank."""
             return self._friction.by_point(solution.slip)
 
         solution = RateIteration().solve(step, rest, slope, solve, slip_of)
-        return self._result(step, solution)
+        return self._make_result(step, solution)
 
     def _solve_sequence(
         self, step: StepProblem, cohesion: Array, slope: Array, before: Solution | None
@@ -112,7 +114,7 @@ class VolumeFriction:
         r_n = np.zeros(surface.count) if before is None else before.r_n
         limit = surface.everywhere(cohesion + slope * np.maximum(r_n, 0.0))
         if before is None:
-            start, iterations = self._first_state(step, limit)
+            start, iterations = self._find_start(step, limit)
         else:
             start = self._scaled.fit_to_limits(before.state, before.slip, limit[mine])
             iterations = 0
@@ -137,7 +139,7 @@ class VolumeFriction:
             "or use Condensed()"
         )
 
-    def _first_state(self, step: StepProblem, limit: Array) -> tuple[FrictionUnknowns, int]:
+    def _find_start(self, step: StepProblem, limit: Array) -> tuple[FrictionUnknowns, int]:
         """Return where to begin, and the iterations that it took. Collective.
 
         It is the guess, sliding as predicted. With disks it is the solution without friction, whose
@@ -176,7 +178,7 @@ class VolumeFriction:
         slip = scaled.slip(state.z, scaled.sliding(y))
         return Solution(state, r_n, active, slip, iterations)
 
-    def _result(self, step: StepProblem, solution: Solution) -> StepResult:
+    def _make_result(self, step: StepProblem, solution: Solution) -> StepResult:
         """Return the answer: points that stick are exactly where they were, r_t is on its disk."""
         surface = self._body.surface
         friction = self._friction

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices
 from ..petsc import PETSc
-from .bounded_system import aij, renumber
+from .bounded_system import make_aij, renumber
 from .friction_system import FrictionSystem, ScaledFrictionStep
 
 Entries = tuple[Any, Any, Array]  # rows of this rank, columns of all, values
@@ -28,7 +28,7 @@ class FrictionJacobian:
         self._system: FrictionSystem = scaled.friction
         self._scaled = weakref.proxy(scaled)  # PETSc holds the matrix: see weakly()
         self._ratio = np.nan
-        total, parts = self._entries()
+        total, parts = self._list_entries()
 
         # The entries of all parts, none of which is given twice, are sorted once by rows and
         # columns: a matrix of their numbers tells the order.
@@ -42,10 +42,10 @@ class FrictionJacobian:
         self._values = {name: values for name, (_, _, values) in parts.items()}
         self._A = parts["A"][2]
         self._flexibility = 1.0 / self._system.stiffness[self._system.line]
-        self.mat = aij(places, self._system.body.comm)
+        self.mat = make_aij(places, self._system.body.comm)
         self._csr = places.indptr.astype(PETSc.IntType), places.indices.astype(PETSc.IntType)
 
-    def _entries(self) -> tuple[int, dict[str, Entries]]:
+    def _list_entries(self) -> tuple[int, dict[str, Entries]]:
         """Return how many columns there are on all ranks, and the parts of the matrix. Collective.
 
         What changes from step to step, or with y, is zero.
@@ -54,7 +54,7 @@ class FrictionJacobian:
         body = system.body
         line = system.line
         pairs = system.pairs
-        indptr, columns, A = _rows_of(body)
+        indptr, columns, A = _copy_rows(body)
         first, columns, total = renumber(system.surface.comm, body.size, system.size, columns)
         lam = body.size + np.arange(len(system.tangent))
         gamma = system.first_gamma + np.arange(len(pairs))
@@ -94,7 +94,14 @@ class FrictionJacobian:
             self._write()
 
     def evaluate(self, snes: Any, y: Any, J: Any, P: Any) -> None:
-        """Compute the derivatives at y; constant in 2D."""
+        """Compute the derivatives at y, as PETSc calls for a Jacobian; constant in 2D.
+
+        Args:
+            snes: PETSc's solver.
+            y: the PETSc vector of unknowns.
+            J: PETSc's Jacobian, which is ``mat``.
+            P: the matrix for the preconditioner, the same.
+        """
         if self._system.any_disk:
             self._update_disks(np.array(y.array_r))
             self._write()
@@ -124,9 +131,9 @@ class FrictionJacobian:
         self.mat.destroy()
 
 
-def _rows_of(body: Any) -> Any:
+def _copy_rows(body: Any) -> Any:
     """Return CSR arrays of the owned rows of the body with its springs, in copies."""
-    assembled = body.assembled()
+    assembled = body.assemble()
     arrays = [np.array(part) for part in assembled.getValuesCSR()]
     if assembled is not getattr(body.A.matrix, "mat", None):
         assembled.destroy()

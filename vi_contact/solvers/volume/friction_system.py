@@ -35,7 +35,7 @@ from ...core.algebra import Array, Mask, max_abs
 from ...core.step import StepProblem
 from ...laws.friction import project
 from .bounded_system import BoundedSystem
-from .scaled_step import ScaledStep, fraction
+from .scaled_step import ScaledStep, divide
 
 
 class FrictionSystem:
@@ -158,7 +158,7 @@ class ScaledFrictionStep(ScaledStep):
         mean = self.friction.stiffness[self.friction.pairs].mean(axis=1)
         return np.asarray(mean * (self.x_ref / self.r_ref))
 
-    def _parts(self, y: Array) -> tuple[Array, Array, Array]:
+    def _evaluate_parts(self, y: Array) -> tuple[Array, Array, Array]:
         """Return E, F_lambda and F_gamma at y."""
         friction = self.friction
         z, reaction, gamma = friction.split(y)
@@ -181,7 +181,7 @@ class ScaledFrictionStep(ScaledStep):
     def residual(self, y: Array) -> Array:
         """Return F(y) as SNES sees it."""
         friction = self.friction
-        body, still, room = self._parts(y)
+        body, still, room = self._evaluate_parts(y)
 
         # What tells the signs after a projection: c lambda·F_lambda / s of disks, E_t / c of lines.
         pairs, of_disks, _ = self.disks(y)
@@ -204,7 +204,7 @@ class ScaledFrictionStep(ScaledStep):
         friction = self.friction
         s = self.disk_limits
         _, reaction, gamma = friction.split(y)
-        body, still, room = self._parts(y)
+        body, still, room = self._evaluate_parts(y)
         force, gap, backward = super().errors(y[: self.system.size], body)
 
         # Slips that are wrong in size or sign beside the bounds of lambda.
@@ -218,7 +218,7 @@ class ScaledFrictionStep(ScaledStep):
         # Of a disk either the slip or the distance from its edge is zero, as shares of their sizes.
         edge = np.minimum(gamma * s / y_max if y_max > 0.0 else gamma, room * self.disk_inverse)
         disk = float(self.system.max(max_abs(edge))[0])
-        return force, max(gap, fraction(slip, y_max), disk), backward
+        return force, max(gap, divide(slip, y_max), disk), backward
 
     def sliding(self, y: Array) -> Mask:
         """Return (m,) which points are on the edge of their disk."""

@@ -18,7 +18,7 @@ from ...core import packages
 from ...core.algebra import Comm
 from ...core.errors import InputError
 from ..petsc import PETSc
-from .failures import last_line
+from .failures import read_last_line
 from .option_names import KNOWN
 
 log = logging.getLogger(__name__)
@@ -65,9 +65,10 @@ class OptionLayers:
             try:
                 solver.setFromOptions()
             except PETSc.Error as error:
+                reason = read_last_line(error)
                 raise InputError(
-                    f"PETSc does not accept the options under {self.prefix} ({last_line(error)}): "
-                    "correct or drop them"
+                    f"PETSc does not accept the options under {self.prefix} ({reason}): correct or "
+                    "drop them"
                 ) from error
             check(solver, self)
 
@@ -98,13 +99,13 @@ class OptionLayers:
         To be called when all has been read that ever will be: after a solve with at least one
         iteration. Collective.
         """
-        for key in self._unread(comm) if self.own else ():
+        for key in self._list_unread(comm) if self.own else ():
             raise InputError(
-                f"{owner}: nothing reads '{key}' of petsc_options: {self._remedy(key)}"
+                f"{owner}: nothing reads '{key}' of petsc_options: {self._suggest(key)}"
             )
         self._tell_unread(owner, comm)
 
-    def _unread(self, comm: Comm) -> list[str]:
+    def _list_unread(self, comm: Comm) -> list[str]:
         """Return the user's options that no rank has read. Collective.
 
         Some ranks may not read an option of blocks, as one without rows has none.
@@ -127,7 +128,7 @@ class OptionLayers:
         unread = [name for name in given if not was_read(name) and name not in _TOLD]
         _TOLD.update(unread)
         for name in unread if comm.rank == 0 else ():
-            remedy = self._remedy(name.removeprefix(self.prefix))
+            remedy = self._suggest(name.removeprefix(self.prefix))
             log.warning("%s: nothing reads the PETSc option -%s: %s", owner, name, remedy)
 
     def excuse_known(self) -> None:
@@ -135,13 +136,13 @@ class OptionLayers:
 
         This solver may have a use for them or not.
         """
-        self.read.update(key for key in self.own if key.removeprefix(_part(key)) in KNOWN)
+        self.read.update(key for key in self.own if key.removeprefix(_find_part(key)) in KNOWN)
 
-    def _remedy(self, key: str) -> str:
+    def _suggest(self, key: str) -> str:
         """Return the end of a sentence about an option that nothing has read."""
         if key.startswith(self.prefix):
             return f"give it without its prefix, as '{key.removeprefix(self.prefix)}'"
-        part = _part(key)
+        part = _find_part(key)
         near = get_close_matches(key.removeprefix(part), KNOWN, n=1, cutoff=0.6)
         if near and part + near[0] != key:
             return f"did you mean '{part}{near[0]}'? Correct it, or leave it out"
@@ -243,7 +244,7 @@ REDUCED_PC = {
 }
 
 
-def _part(key: str) -> str:
+def _find_part(key: str) -> str:
     """Return how the name of an option begins that is for blocks or levels; else an empty text."""
     return next((part for part in PARTS if key.startswith(part)), "")
 
@@ -251,7 +252,7 @@ def _part(key: str) -> str:
 EXCHANGE = ("umfpack", "superlu")  # solvers that exchange rows
 
 
-def direct(kind: str, ranks: int, *, exchanges: bool = False) -> Options:
+def choose_direct(kind: str, ranks: int, *, exchanges: bool = False) -> Options:
     """Return the options of a direct solver that this PETSc was built with.
 
     It is MUMPS, or else a solver for one rank, of which every rank has a copy; the log says which.

@@ -6,6 +6,11 @@ In the rotated basis every condition is a bound on one unknown, which is all tha
 know of contact. With friction the tangential reactions become bounded unknowns too (``friction``);
 then there is nothing to minimise, and only SNES can do it. Reference: PETSc manual, chapters SNES
 (variational inequalities) and TAO.
+
+From the settings to PETSc: ``Volume`` holds the settings; ``PreparedVolume`` has one PETSc solver
+for one A, which a *driver* runs (``snes``, ``tao``); the driver sees a step through
+``scaled_step.ScaledStep``, whose numbers are near one, of a ``bounded_system.BoundedSystem``; the
+options of method, user and command line are laid over each other by ``options.OptionLayers``.
 """
 
 from collections.abc import Mapping
@@ -21,10 +26,10 @@ from ...core.surfaces import ContactSurface
 from ..certified import check_laws
 from ..petsc import PETSc
 from .bounded_system import BoundedSystem
-from .failures import petsc_failure
+from .failures import make_petsc_failure
 from .friction import VolumeFriction
 from .friction_system import FrictionSystem, ScaledFrictionStep
-from .options import OptionLayers, Options, direct
+from .options import OptionLayers, Options, choose_direct
 from .scaled_step import ScaledStep
 from .snes import ReducedNewton, SemismoothNewton, SnesDriver
 from .tao import TaoDriver, TaoTron
@@ -127,13 +132,13 @@ class PreparedVolume:
     def __init__(
         self, settings: Volume, A: EffectiveMatrix, surface: ContactSurface, scale: float
     ) -> None:
-        """Make the solver without friction: see ``Volume.prepare``."""
+        """Make the solver without friction: see ``Volume.prepare``. Collective."""
         self._settings = settings
         self._method = settings.method
         self._name = f"Volume({type(settings.method).__name__})"
         self._comm = surface.comm
         self._system = BoundedSystem(A, surface, scale)
-        PETSc.garbage_cleanup(self._system.comm)
+        PETSc.garbage_cleanup(self._system.comm)  # frees solvers of before that nobody has closed
 
         # Options; a matrix that is not symmetric has no Cholesky factor.
         self._read: set[str] = set()  # options of the user that PETSc has read
@@ -141,9 +146,11 @@ class PreparedVolume:
         ranks = surface.comm.size
         defaults = settings.method.defaults(ranks)
         if not self._system.symmetric:
-            defaults = {**defaults, **direct("lu", ranks)}
+            defaults = {**defaults, **choose_direct("lu", ranks)}
         self._layers = self._make_layers(defaults)
 
+        # One driver at a time: of steps without friction at first, or of those with friction, which
+        # ``_prepare_friction`` puts into its place. None when it is closed.
         self._scaled = ScaledStep(self._system, settings.tolerance)
         self._friction: VolumeFriction | None = None
         self._driver: SnesDriver | TaoDriver | None
@@ -154,8 +161,8 @@ class PreparedVolume:
         settings = self._settings
         return OptionLayers(settings.prefix, defaults, settings.petsc_options, self._read)
 
-    def _friction_method(self) -> VolumeFriction:
-        """Return the solver of steps with friction, made at the first of them.
+    def _prepare_friction(self) -> VolumeFriction:
+        """Return the solver of steps with friction, made at the first of them. Collective.
 
         It takes the place of the other one.
         """
@@ -188,7 +195,8 @@ class PreparedVolume:
         """Free the PETSc objects; collective."""
         if self._driver is not None:
             self._driver.destroy()
-        self._driver = self._friction = None
+        self._driver = None
+        self._friction = None
 
     def solve(self, step: StepProblem) -> StepResult:
         """Return the answer to a step. Collective.
@@ -200,13 +208,13 @@ class PreparedVolume:
             if step.slip0 is None:
                 result = self._solve_without_friction(step)
             else:
-                result = self._friction_method().solve(step)
+                result = self._prepare_friction().solve(step)
         except PETSc.Error as error:
             self.close()  # its state is unknown; the next step gets a new one
             if error.__cause__ is not None:
                 # raised in one of our callbacks; PETSc before 3.22 passes it on
                 raise error.__cause__ from None
-            raise petsc_failure(self._name, error) from error
+            raise make_petsc_failure(self._name, error) from error
         except StepFailure:
             self.close()
             raise
@@ -218,7 +226,10 @@ class PreparedVolume:
         self._all_read = True
 
     def _refuse_unread(self, iterations: int) -> None:
-        """Raise InputError for options that nothing has read after the first iterations."""
+        """Raise InputError for options that nothing has read after the first iterations.
+
+        PETSc reads some of them only when a solver iterates. Collective.
+        """
         if iterations and not self._all_read:
             self._all_read = True
             self._layers.refuse_unread(self._name, self._comm)
@@ -227,9 +238,11 @@ class PreparedVolume:
         """Return the answer to a step without friction."""
         system = self._system
         scaled = self._scaled
-        if self._driver is None or self._friction is not None:
+        if self._driver is None or self._friction is not None:  # closed, or of steps with friction
             self.close()
             self._driver = self._method.driver(scaled, self._layers)
+
+        # Solve for y = z / x_ref; x are the first rows of z, the others belong to springs.
         scaled.set(step, system.start(step))
         y, active, r_n, iterations = scaled.answer(self._driver, self._name)
         return StepResult(y[: system.rows] * scaled.x_ref, r_n, active, iterations, self._name)

@@ -13,7 +13,7 @@ from ...core.algebra import Array, Mask, max_abs, total
 from ...core.step import StepProblem
 from ..petsc import PETSc
 from .bounded_system import BoundedSystem
-from .failures import NOT_A_NUMBER, reason_failure
+from .failures import NOT_A_NUMBER, make_reason_failure
 
 # backward error |A z - b| / (|A| |z| + |b|), largest entries, of a solve that cannot be improved
 ROUND_OFF = 1e-14
@@ -51,11 +51,11 @@ class ScaledStep:
         reach = upper[:0] if step.lower is not None else upper[np.isfinite(upper)]
         z_max, bound_max, b_max = system.max(max_abs(start), max_abs(reach), max_abs(self.b))
         if z_max == 0.0:
-            z_max = self._size_along(self.b, b_max)
+            z_max = self._estimate_size(self.b, b_max)
         if b_max <= ROUND_OFF * self._norm * z_max:  # nothing, or what rounding left of it
             b_max = max(b_max, float(system.max(max_abs(system.apply(start)))[0]))
-        self.x_ref = _power_of_two(max(z_max, bound_max))
-        self.r_ref = _power_of_two(b_max)
+        self.x_ref = _round_up_to_power_of_two(max(z_max, bound_max))
+        self.r_ref = _round_up_to_power_of_two(b_max)
 
         self.lower = lower / self.x_ref
         self.upper = upper / self.x_ref
@@ -63,7 +63,7 @@ class ScaledStep:
         self._b_max = b_max / self.r_ref
         self.worst = np.inf
 
-    def _size_along(self, b: Array, b_max: float) -> float:
+    def _estimate_size(self, b: Array, b_max: float) -> float:
         """Return the size of the minimiser of ½ zᵀA z - bᵀz along b, of largest entry b_max.
 
         It stands for the size of z when nothing else is known.
@@ -79,17 +79,30 @@ class ScaledStep:
         """Return F(y)."""
         return np.asarray((self.system.apply(y * self.x_ref) - self.b) / self.r_ref)
 
-    def function(self, _solver: Any, y: Any, F: Any) -> None:
-        """Evaluate F(y) as a PETSc callback (SNES function, TAO gradient)."""
+    def write_residual(self, _solver: Any, y: Any, F: Any) -> None:
+        """Evaluate F(y), as PETSc calls the function of a SNES.
+
+        Args:
+            _solver: the SNES.
+            y: the PETSc vector of unknowns.
+            F: the PETSc vector that gets the residual.
+        """
         F.array[:] = self.residual(y.array_r)
 
-    def objective(self, _solver: Any, y: Any, G: Any) -> float:
-        """Return f(y) - f(origin) and write the gradient F(y) into G, for TAO.
+    def write_gradient(self, _solver: Any, y: Any, G: Any) -> float:
+        """Return f(y) - f(origin) and write the gradient F(y) into G, as TAO calls for both.
 
-        f(y) = ½ y·Hy - y·b/r_ref, H = A x_ref / r_ref.
+        f(y) = ½ y·Hy - y·b/r_ref, H = A x_ref / r_ref, so that with dy = y - origin
+
+            f(y) - f(origin) = ½ dy·(F(y) + F(origin))
 
         A line search compares values, which agree in all their digits where the gradient still has
         eight to lose: values are therefore taken from an origin near the answer.
+
+        Args:
+            _solver: the TAO.
+            y: the PETSc vector of unknowns.
+            G: the PETSc vector that gets the gradient.
         """
         values = y.array_r
         F = self.residual(values)
@@ -160,9 +173,9 @@ class ScaledStep:
             return np.nan, np.nan, np.nan
         size = self._norm * y_max * self.x_ref / self.r_ref + self._b_max
         return (
-            fraction(force_max, max(self._b_max, Ax_max)),
-            fraction(gap_max, y_max),
-            fraction(force_max, size),
+            divide(force_max, max(self._b_max, Ax_max)),
+            divide(gap_max, y_max),
+            divide(force_max, size),
         )
 
     def verdict(self, y: Array, F: Array) -> int:
@@ -200,7 +213,7 @@ class ScaledStep:
         """
         y, F, reason, iterations = driver.run()
         if reason <= 0 and not self.accepts(y, F):
-            raise reason_failure(name, driver.reasons, reason, iterations, self.worst)
+            raise make_reason_failure(name, driver.reasons, reason, iterations, self.worst)
         active = self.active(y, F)
         r_n = np.where(active, self.system.reactions(F * self.r_ref), 0.0)
         return y, active, r_n, iterations
@@ -215,7 +228,7 @@ class ScaledStep:
         return self.worst <= self.tolerance
 
 
-def _power_of_two(value: float) -> float:
+def _round_up_to_power_of_two(value: float) -> float:
     """Return the power of two next above the value; one for zero, infinity and NaN.
 
     PETSc reports these itself.
@@ -225,6 +238,6 @@ def _power_of_two(value: float) -> float:
     return float(np.exp2(np.ceil(np.log2(value))))
 
 
-def fraction(value: float, reference: float) -> float:
+def divide(value: float, reference: float) -> float:
     """Return value/reference, or the value itself where the reference is not above zero."""
     return value / reference if reference > 0.0 else value

@@ -25,7 +25,7 @@ from .options import (
     check_friction,
     check_reduced,
     check_semismooth,
-    direct,
+    choose_direct,
 )
 from .scaled_step import ScaledStep
 
@@ -70,7 +70,7 @@ class SnesDriver:
         self.solver.setOptionsPrefix(layers.prefix)
         self.solver.setType(snes_type)  # before the convergence test, which it would overwrite
         self._first = 0.0
-        self.solver.setFunction(weakly(scaled.function), self._F)
+        self.solver.setFunction(weakly(scaled.write_residual), self._F)
         self.solver.setJacobian(weakly(jacobian.evaluate), jacobian.mat)
         self.solver.setVariableBounds(self._lower, self._upper)
         self.solver.setConvergenceTest(weakly(self._test))
@@ -127,6 +127,7 @@ def weakly(method: Callable[..., Any]) -> Callable[..., Any]:
     reference = weakref.WeakMethod(method)
 
     def call(*arguments: Any) -> Any:
+        """Call the method, while its object lives."""
         alive = reference()
         assert alive is not None, "a PETSc solver outlived its driver"
         return alive(*arguments)
@@ -134,7 +135,7 @@ def weakly(method: Callable[..., Any]) -> Callable[..., Any]:
     return call
 
 
-class Lent:
+class LentContext:
     """Pass an object to PETSc as context, and do not keep it alive: see ``weakly``."""
 
     def __init__(self, lent: Any) -> None:
@@ -168,7 +169,7 @@ class AssembledJacobian:
 
     def __init__(self, system: BoundedSystem) -> None:
         """Make a matrix of the pattern of A. Collective."""
-        self._A = system.assembled()
+        self._A = system.assemble()
         self._own = self._A is not getattr(system.A.matrix, "mat", None)
         self.mat = self._A.duplicate(copy=True)
         self._symmetric = system.symmetric
@@ -182,7 +183,14 @@ class AssembledJacobian:
             self.mat.setOption(PETSc.Mat.Option.SPD, self._symmetric)
 
     def evaluate(self, snes: Any, y: Any, J: Any, P: Any) -> None:
-        """Do nothing: the matrix is constant."""
+        """Do nothing when PETSc calls for a Jacobian: the matrix is constant.
+
+        Args:
+            snes: PETSc's solver, or TAO's.
+            y: the PETSc vector of unknowns.
+            J: PETSc's Jacobian, which is ``mat``.
+            P: the matrix for the preconditioner, the same.
+        """
 
     def _copy(self) -> None:
         """Write H into the matrix."""
@@ -207,7 +215,14 @@ class SemismoothJacobian(AssembledJacobian):
         self._ratio = ratio
 
     def evaluate(self, snes: Any, y: Any, J: Any, P: Any) -> None:
-        """Make a fresh copy."""
+        """Make a fresh copy, as PETSc calls for a Jacobian.
+
+        Args:
+            snes: PETSc's solver, or TAO's.
+            y: the PETSc vector of unknowns.
+            J: PETSc's Jacobian, which is ``mat``.
+            P: the matrix for the preconditioner, the same.
+        """
         self._copy()
         self.mat.setOption(PETSc.Mat.Option.SYMMETRIC, False)
 
@@ -225,7 +240,7 @@ class ReducedNewton:
 
     def defaults(self, ranks: int) -> Options:
         """Return the options that come before the user's."""
-        return {**NEWTON, **direct("cholesky", ranks)}
+        return {**NEWTON, **choose_direct("cholesky", ranks)}
 
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> SnesDriver:
         """Return the SNES object."""
@@ -239,7 +254,7 @@ class ReducedNewton:
         pivots, for which MUMPS on several ranks needs more room than usual, or stops with
         INFOG(1) = -9.
         """
-        return {**NEWTON, **direct("lu", ranks, exchanges=True), "mat_mumps_icntl_14": 200}
+        return {**NEWTON, **choose_direct("lu", ranks, exchanges=True), "mat_mumps_icntl_14": 200}
 
     def friction_driver(self, scaled: ScaledFrictionStep, layers: OptionLayers) -> SnesDriver:
         """Return the SNES object of a step with friction."""
@@ -259,7 +274,7 @@ class SemismoothNewton:
 
     def defaults(self, ranks: int) -> Options:
         """Return the options that come before the user's."""
-        return {**NEWTON, "snes_linesearch_type": "bt", **direct("lu", ranks)}
+        return {**NEWTON, "snes_linesearch_type": "bt", **choose_direct("lu", ranks)}
 
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> SnesDriver:
         """Return the SNES object."""

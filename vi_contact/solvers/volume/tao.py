@@ -56,7 +56,7 @@ class TaoDriver:
         self.solver = PETSc.TAO().create(scaled.system.comm)
         self.solver.setOptionsPrefix(layers.prefix)
         self.solver.setType("tron")
-        self.solver.setObjectiveGradient(weakly(scaled.objective), self._gradient)
+        self.solver.setObjectiveGradient(weakly(scaled.write_gradient), self._gradient)
         self.solver.setHessian(weakly(self._hessian.evaluate), self._hessian.mat)
         self.solver.setVariableBounds((self._lower, self._upper))
         self.solver.setSolution(self._y)

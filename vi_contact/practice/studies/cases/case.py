@@ -47,7 +47,7 @@ from ....run.method import with_defaults
 from ....run.recorders import Contact, Energy
 from ....run.recorders.steps import Steps
 from ....run.simulate import Solution, simulate
-from ....run.time_steps import StepPlan, step_plan
+from ....run.time_steps import StepPlan, plan_steps
 from ...engineering.checks.comparison import Check
 from .bodies import (
     BeamBody,
@@ -159,7 +159,7 @@ class Case:
         has_end = "steps" in arguments or "t_end" in arguments
         steps = arguments.get("steps") if has_end else 1
         try:
-            step_plan(arguments["dt"], steps, arguments.get("t_end"))
+            plan_steps(arguments["dt"], steps, arguments.get("t_end"))
         except InputError as error:
             raise InputError(f"{self.path}: [run] {error}") from None
 
@@ -173,7 +173,7 @@ class Case:
     def plan(self, parts: Parts) -> StepPlan:
         """Return the base steps of the run."""
         arguments = self._build_run(parts)
-        return step_plan(arguments["dt"], arguments.get("steps"), arguments.get("t_end"))
+        return plan_steps(arguments["dt"], arguments.get("steps"), arguments.get("t_end"))
 
     def _build_run(self, parts: Parts) -> dict[str, Any]:
         """Return what [run] gives.

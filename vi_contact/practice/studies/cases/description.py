@@ -19,7 +19,7 @@ from ....core.step import AXES
 from ....fem.body.space import space_of
 from ....fem.mesh.tagged_mesh import Cells, Facets
 from ....fem.output.outline import cell_volumes, facets_with_cells, longest_edge, outline
-from ....run.damping import NOT_COMPUTED, damping_in_words, first_modes, first_open_period
+from ....run.damping import NOT_COMPUTED, describe_damping, first_modes, first_open_period
 from ....run.files.folder import MODEL
 from ....run.loose_bodies import judge_loose_bodies
 from ....run.sampling import sampling_warning
@@ -495,7 +495,7 @@ def _describe_modes(case: Any, problem: ContactProblem, most: int) -> dict[str, 
     if problem.system.C is None and "periods" not in modes and few:
         return {**modes, "damping_ratios": [], "damping": "none"}
     unknown = "" if few else f"{NOT_COMPUTED}, as the model has more than {most} unknowns"
-    return {**modes, "damping": damping_in_words(problem, unknown=unknown)}
+    return {**modes, "damping": describe_damping(problem, unknown=unknown)}
 
 
 def _find_defects(model: Mapping[str, Any]) -> Iterator[str]:

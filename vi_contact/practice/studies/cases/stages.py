@@ -26,7 +26,7 @@ from ....core.state_checks import initial_state
 from ....core.step import State
 from ....fem.body.released_supports import release, removed_support, same_supports, started
 from ....fem.mesh.communicators import MpiComm
-from ....run.files.checkpoint import state_checksum
+from ....run.files.checkpoint import read_state_checksum
 from ....run.files.folder import (
     CHECKPOINT,
     FOLLOWS,
@@ -138,7 +138,7 @@ def run_stages(
             place = out or (source if follows else None)
             checksum = None
             if place is not None:
-                checksum = on_root(ranks, partial(state_checksum, place / folder))
+                checksum = on_root(ranks, partial(read_state_checksum, place / folder))
             before += f"{checksum} {solution.state.k}\n"
     return solution
 
