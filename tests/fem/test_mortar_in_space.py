@@ -28,7 +28,7 @@ from vi_contact.fem.contact.clipping import areas, hats, overlaps, rule, without
 from vi_contact.fem.contact.joined import joined_surfaces
 from vi_contact.fem.contact.matching import Matched, Side
 from vi_contact.fem.contact.mortar import DualMortar
-from vi_contact.fem.contact.nodes import Nodes, joined_nodes
+from vi_contact.fem.contact.nodes import Nodes, join_nodes
 from vi_contact.fem.contact.pairs import contact_pair
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.mesh.tagged_mesh import Facets, build_mesh
@@ -197,7 +197,7 @@ def test_only_what_is_nearest_counts(kinds, length):
     count = len(low.nodes.numbers)
     upper = replace(step.nodes, numbers=step.nodes.numbers + count)
     two = Side(
-        "both", joined_nodes([low.nodes, upper]), np.concatenate([low.facets, step.facets + count])
+        "both", join_nodes([low.nodes, upper]), np.concatenate([low.facets, step.facets + count])
     )
     one = face(kinds[0], (5, 4), up=False, height=0.5)
     found = DualMortar().match(one, two, 1.0)
@@ -221,7 +221,7 @@ def test_a_hidden_layer_of_the_same_outline_is_not_felt(kinds):
     behind = replace(far.nodes, numbers=far.nodes.numbers + count)
     two = Side(
         "both",
-        joined_nodes([near.nodes, behind]),
+        join_nodes([near.nodes, behind]),
         np.concatenate([near.facets, far.facets + count]),
     )
     one = face(kinds[0], (4, 4), up=False)

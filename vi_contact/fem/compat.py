@@ -428,7 +428,7 @@ def function(space: Any) -> Any:
     return fem.Function(space)
 
 
-def facet_dofs(space: Any, facets: Indices) -> Indices:
+def locate_blocks(space: Any, facets: Indices) -> Indices:
     """Return the local blocks of unknowns on the facets. Collective.
 
     They are found on every rank that owns or ghosts them.
@@ -439,9 +439,9 @@ def facet_dofs(space: Any, facets: Indices) -> Indices:
     return fem.locate_dofs_topological(space, tdim - 1, np.asarray(facets, dtype=np.int32))
 
 
-def owned_facet_dofs(space: Any, facets: Indices) -> npt.NDArray[np.int64]:
+def locate_owned_blocks(space: Any, facets: Indices) -> npt.NDArray[np.int64]:
     """Return the owned blocks of unknowns on the facets, wherever these are owned. Collective."""
-    blocks = facet_dofs(space, facets)
+    blocks = locate_blocks(space, facets)
     return np.asarray(blocks[blocks < space.dofmap.index_map.size_local], dtype=np.int64)
 
 

@@ -29,7 +29,7 @@ from ...laws.materials import Damping, Section
 from .. import compat
 from ..matrices.half import algebra_for
 from ..matrices.petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
-from ..matrices.petsc_rows import moved
+from ..matrices.petsc_rows import transfer
 from ..mesh.communicators import MpiComm, give_back
 from ..mesh.numbering import number_nodes
 from ..mesh.tagged_mesh import Cells, Facets
@@ -42,7 +42,7 @@ from .assembly_checks import (
 )
 from .conditions import as_tuple, gather_conditions
 from .dashpots import DashpotMatrix, Dashpots, describe_boundaries
-from .dirichlet import given_space, given_values, refuse_contradictions, refuse_uneven
+from .dirichlet import choose_space, read_values, refuse_contradictions, refuse_uneven
 from .elimination import Elimination
 from .forms import ElasticForms, Materials, cell_materials
 from .initial_strains import InitialStrain, InitialStrains
@@ -155,7 +155,7 @@ def assemble(
     bcs = as_tuple(bcs)
     refuse_uneven(comm, bcs)
     if bcs or space is not None:
-        space, degree = given_space(mesh, space, bcs)
+        space, degree = choose_space(mesh, space, bcs)
     section, damping = check_body(
         mesh,
         material,
@@ -178,13 +178,13 @@ def assemble(
     check_nodes(comm, nodes, degree)
     if nodes.curved:
         refuse_folded(mesh)
-    blocks = [compat.owned_facet_dofs(V, one.facets.indices) for one in conditions.held]
+    blocks = [compat.locate_owned_blocks(V, one.facets.indices) for one in conditions.held]
     supports = [
         one.support(on_facets, mesh.geometry.dim)
         for one, on_facets in zip(conditions.held, blocks, strict=True)
     ]
     if bcs:
-        supports += [one.support(nodes.owned) for one in given_values(mesh, V, bcs)]
+        supports += [one.support(nodes.owned) for one in read_values(mesh, V, bcs)]
     space = FemSpace(
         V, nodes, supports, conditions.tied, degree=degree, quadrature_degree=quadrature_degree
     )
@@ -287,7 +287,7 @@ def _reduce(
     elimination = space.elimination
     directions = translations(len(space.nodes), space.dimension)
     motions = [
-        partial(space.prescribed_values, derivative=k) if space.moves else None for k in range(3)
+        partial(space.evaluate_prescribed, derivative=k) if space.moves else None for k in range(3)
     ]
     # one after the other: each is large before it is reduced
     K, elastic = _eliminate(body.matrix("K"), elimination, algebra, motions[0])
@@ -331,11 +331,11 @@ def _eliminate(
     pull: tuple[Callable[[float], Array], ...] = ()
     # the columns of held components are kept for the load, before the full matrix goes
     if motion is not None:
-        matrix = PetscMatrix(moved(elimination.held_columns(full), algebra.comm.mpi))
+        matrix = PetscMatrix(transfer(elimination.take_held_columns(full), algebra.comm.mpi))
         pull = (lambda t: -elimination.pull(matrix @ motion(t)[elimination.held]),)
     part = elimination.reduce(full)
     full.destroy()
-    return algebra.held(moved(part, algebra.comm.mpi)), pull
+    return algebra.store(transfer(part, algebra.comm.mpi)), pull
 
 
 def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...]) -> Load:
@@ -382,7 +382,7 @@ def _integrate(space: FemSpace, section: Section, load: AnyLoad) -> Callable[[fl
     g = ufl.TrialFunction(space.V)
     v = ufl.TestFunction(space.V)
     form = ufl.inner(load.acting(g, space.mesh), v) * load.measure(space.mesh)
-    matrix = PetscMatrix(compat.assemble_matrix(space.compiled(form)))
+    matrix = PetscMatrix(compat.assemble_matrix(space.compile_form(form)))
     name = type(load).__name__
 
     def force(t: float) -> Array:

@@ -28,7 +28,7 @@ from ...laws.materials import (
 )
 from .. import compat
 from ..mesh.communicators import MpiComm
-from ..mesh.group_checks import cells_of, field_given
+from ..mesh.group_checks import cells_of, check_field
 from ..mesh.numbering import NodeTable
 from .form_checks import refuse_complex
 from .forms import KINDS, ElasticForms
@@ -343,7 +343,7 @@ def check_initial(mesh: Mesh, **values: Any) -> None:
             for cells, _ in pairs:
                 cells_of(OWNER, f"the cells of {name}", cells, mesh)
         for field in fields:
-            field_given(OWNER, name, field)
+            check_field(OWNER, name, field)
 
 
 def _pair(name: str, pair: Any, remedy: str) -> tuple[Any, Any]:

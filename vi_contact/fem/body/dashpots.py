@@ -118,7 +118,7 @@ class CompliantBase(Dashpots):
 
     def loads(self, matrix: "DashpotMatrix", forms: Any) -> BoundaryLoads:
         """Return the load of the upgoing wave, 2 Pᵀ D v_up."""
-        load = matrix.moved_by(self.motion, 2.0)
+        load = matrix.make_load(self.motion, 2.0)
         load(0.0)  # a motion of other components is refused before any work
         return BoundaryLoads(viscous=(load,))
 
@@ -167,7 +167,7 @@ class DashpotMatrix:
         along = ufl.dot(u, n) * ufl.dot(v, n)
         density = self._normal * along + self._tangential * (ufl.inner(u, v) - along)
         measure = compat.measure(self.space.mesh, self.space.mesh.topology.dim - 1, facets)
-        return compat.assemble_matrix(self.space.compiled(density * measure))
+        return compat.assemble_matrix(self.space.compile_form(density * measure))
 
     def _resistance(self, mat: Any) -> Array:
         """Return ∫ e_c·D e_c of every direction c, on all ranks."""
@@ -199,7 +199,9 @@ class DashpotMatrix:
                         "out one of the two"
                     )
 
-    def moved_by(self, motion: Callable[[float], Array], factor: float) -> Callable[[float], Array]:
+    def make_load(
+        self, motion: Callable[[float], Array], factor: float
+    ) -> Callable[[float], Array]:
         """Return the load factor Pᵀ D v(t), v the same at all nodes."""
         whole = PetscMatrix(self.mat)
         rows = [self.space.pull(whole @ e) for e in self.space.translations]

@@ -77,7 +77,7 @@ def refuse_uneven(comm: MpiComm, bcs: Sequence[Any]) -> None:
         )
 
 
-def given_space(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[Any, int]:
+def choose_space(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[Any, int]:
     """Return (the user's space, or that of the conditions without one; its degree). Collective.
 
     Args:
@@ -123,7 +123,7 @@ def given_space(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[Any, int]:
     )
 
 
-def given_values(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[GivenValues, ...]:
+def read_values(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[GivenValues, ...]:
     """Return what conditions hold of a displacement's space. Collective.
 
     Args:

@@ -74,7 +74,7 @@ class Elimination:
             return triple_product(full, self._P.mat)
         return _part(full, self.free, self.free)
 
-    def held_columns(self, full: Any) -> Any:
+    def take_held_columns(self, full: Any) -> Any:
         """Return the columns of held components of a PETSc matrix of all. Collective."""
         return _part(full, np.ones_like(self.free), self.held)
 

@@ -139,8 +139,8 @@ class InitialStrains:
         cell = ufl.TestFunction(compat.cell_space(mesh))
         self.parts = own, across = self._split(self._field)
         sigma, beyond = body.hooke(own, across, ufl.tr(own))
-        self._work = self._space.compiled(ufl.inner(sigma, ufl.sym(ufl.grad(body.v))) * ufl.dx)
-        self._energy = self._space.compiled(
+        self._work = self._space.compile_form(ufl.inner(sigma, ufl.sym(ufl.grad(body.v))) * ufl.dx)
+        self._energy = self._space.compile_form(
             0.5 * (ufl.inner(sigma, own) + beyond * across) * cell * ufl.dx
         )
         self._still: tuple[Array, float] | None = (

@@ -89,7 +89,7 @@ class LinearForm:
         name = f"{NAME}: form"
         v = ufl.TestFunction(space.V)
         form = form_of(name, self.form, space, v)
-        vector_of = on_all(space.comm, name, lambda: space.compiled(form))
+        vector_of = on_all(space.comm, name, lambda: space.compile_form(form))
         update = self.update
 
         def at(t: float) -> Array:

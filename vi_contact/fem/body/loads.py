@@ -19,7 +19,7 @@ from ...core.algebra import Array, Comm, Indices
 from ...core.checks import explain_error, function, number, optional, refuse, shown
 from ...core.quantities import Unit
 from .. import compat
-from ..mesh.group_checks import components_given, components_of, facets_of, field_given
+from ..mesh.group_checks import check_components, check_field, components_of, facets_of
 from ..mesh.tagged_mesh import Facets
 
 Field = Callable[[Array, float], Array]
@@ -103,8 +103,8 @@ class Prescribed:
     def __post_init__(self) -> None:
         facets_of("Prescribed", "facets", self.facets)
         for name in ("displacement", "velocity", "acceleration"):
-            field_given("Prescribed", name, getattr(self, name))
-        components_given("Prescribed", self.components)
+            check_field("Prescribed", name, getattr(self, name))
+        check_components("Prescribed", self.components)
 
     @property
     def name(self) -> str:
@@ -227,7 +227,7 @@ class ActingLoad:
 
     def __post_init__(self) -> None:
         owner = type(self).__name__
-        field_given(owner, "value", self.value)
+        check_field(owner, "value", self.value)
         optional(
             function, owner, "history", self.history, "give a function of the time [s], or None"
         )

@@ -104,7 +104,7 @@ class OwnForms(ElasticForms):
         if dampers:
             self._forms["C"] = sum(dampers[1:], dampers[0])
         self._full = {
-            name: matrix_of(ROLES[name], space, partial(space.compiled, form))
+            name: matrix_of(ROLES[name], space, partial(space.compile_form, form))
             for name, form in self._forms.items()
         }
         refuse_masses(self._full["M"], space)

@@ -58,12 +58,12 @@ def release(
     added = _stand(before, after, nodal)
     u0 = after.restrict(nodal)
     still = np.zeros_like(u0)
-    _, first = started(problem, u0, still, state)
+    _, first = begin_from(problem, u0, still, state)
     _refuse_moved(static, state, nodal, problem, first)
     spaces = [_spaces(one, problem)[0] for one in (static, *earlier)]
     held = [one.held | np.isin(one.nodes, one.tied_nodes)[:, None] for one in spaces]
     was_held = np.any([*held, _beside(after, added)], axis=0).ravel()[after.free]
-    return started(problem, u0, still, state, _missing(problem, u0, first, was_held))
+    return begin_from(problem, u0, still, state, _missing(problem, u0, first, was_held))
 
 
 def _spaces(static: ContactProblem, problem: ContactProblem) -> tuple[FemSpace, FemSpace]:
@@ -106,7 +106,7 @@ def same_supports(before: ContactProblem, problem: ContactProblem) -> bool:
     return True
 
 
-def started(
+def begin_from(
     problem: ContactProblem, u0: Array, v0: Array, state: State, force: Array | float = 0.0
 ) -> tuple[ContactProblem, State]:
     """Return the problem that begins with u0, v0 and has a constant force [N] more.
@@ -161,7 +161,7 @@ def _missing(problem: ContactProblem, u0: Array, state: State, was_held: Mask) -
     return force
 
 
-def removed_support(
+def find_removed_support(
     before: ContactProblem, after: ContactProblem, force: Array
 ) -> tuple[str, float]:
     """Return (name, reaction [N]) of the removed support with most of a force. Collective.

@@ -16,7 +16,7 @@ from ...core.errors import InputError
 from ...core.system import SemiDiscreteSystem
 from .. import compat
 from ..matrices.petsc_algebra import PetscAlgebra
-from ..mesh.communicators import MpiComm, kept
+from ..mesh.communicators import MpiComm, keep_communicator
 from ..mesh.group_checks import cells_of
 from ..mesh.nodal_space import NodalSpace, bounding_box
 from ..mesh.numbering import NodeTable, facet_rows, node_numbers
@@ -62,7 +62,7 @@ def bodies_of(system: SemiDiscreteSystem, cells: Cells) -> tuple[int, ...]:
     return tuple(mine.tolist())
 
 
-def known_matrices(owner: str, system: SemiDiscreteSystem, names: str) -> None:
+def warn_of_other_matrices(owner: str, system: SemiDiscreteSystem, names: str) -> None:
     """Warn when M, C or K of a system is not what fem.assemble made.
 
     It is for outputs that go by the materials given there.
@@ -141,7 +141,7 @@ class FemSpace(NodalSpace):
         self.mesh = V.mesh
         self.degree = degree
         self.quadrature_degree = quadrature_degree
-        self.comm: MpiComm = MpiComm(kept(self.mesh.comm))
+        self.comm: MpiComm = MpiComm(keep_communicator(self.mesh.comm))
         self.algebra = PetscAlgebra(self.comm.mpi)
         self.dimension: int = self.mesh.geometry.dim
         self.node_of_block: Indices = nodes.numbers
@@ -199,7 +199,7 @@ class FemSpace(NodalSpace):
         """Return the bytes of the mesh on this rank."""
         return compat.mesh_bytes(self.mesh)
 
-    def compiled(self, form: Any) -> Any:
+    def compile_form(self, form: Any) -> Any:
         """Return a form compiled.
 
         Its integrals have the degree of the space, if any, unless they say their own.
@@ -208,7 +208,7 @@ class FemSpace(NodalSpace):
 
     def facet_blocks(self, facets: Any) -> Indices:
         """Return the owned blocks (nodes) on the facets, wherever the facets are owned."""
-        return compat.owned_facet_dofs(self.V, facets)
+        return compat.locate_owned_blocks(self.V, facets)
 
     def corners_of_facets(self, facets: Any) -> Indices:
         """Return the numbers (k, n) of the contact nodes on each of these facets. Collective.
@@ -323,7 +323,7 @@ class FemSpace(NodalSpace):
     # Vectors
     # ----------------------------------------------------------------------------------------------
 
-    def prescribed_values(self, t: float, derivative: int = 0) -> Array:
+    def evaluate_prescribed(self, t: float, derivative: int = 0) -> Array:
         """Return the full owned vector of U(x, t) or its time derivative; zero on free components.
 
         Where conditions meet, the later one counts; what they say is added to where an earlier
@@ -348,20 +348,20 @@ class FemSpace(NodalSpace):
             t: time [s].
             derivative: 0 for displacements, 1 and 2 for their rates.
         """
-        full = self.elimination.expand(u, self.prescribed_values(t, derivative))
+        full = self.elimination.expand(u, self.evaluate_prescribed(t, derivative))
         return full.reshape(-1, self.dimension)
 
     def pull(self, force: Array) -> Array:
         """Pull back by Pᵀ: forces on all owned components -> on the free ones."""
         return self.elimination.pull(force)
 
-    def reduced(self, full: Any) -> Any:
+    def reduce(self, full: Any) -> Any:
         """Return PᵀAP of the free components of a PETSc matrix of all. Collective."""
         return self.elimination.reduce(full)
 
-    def held_columns(self, full: Any) -> Any:
+    def take_held_columns(self, full: Any) -> Any:
         """Return the columns of prescribed components of a PETSc matrix of all. Collective."""
-        return self.elimination.held_columns(full)
+        return self.elimination.take_held_columns(full)
 
     def restrict(self, full: Array) -> Array:
         """Restrict nodal values (owned nodes, d) to the free vector."""

@@ -20,7 +20,7 @@ from ...core.algebra import Array, Indices
 from ...core.checks import at
 from ...core.errors import InputError
 from ...meshes.rows import connected
-from ..mesh.group_checks import components_given, components_of, facets_of
+from ..mesh.group_checks import check_components, components_of, facets_of
 from ..mesh.tagged_mesh import Facets
 
 PLACE_TOLERANCE = (
@@ -44,7 +44,7 @@ class Tied:
     def __post_init__(self) -> None:
         for name in ("first", "second"):
             facets_of("Tied", name, getattr(self, name))
-        components_given("Tied", self.components)
+        check_components("Tied", self.components)
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,7 +35,7 @@ class Borrowed:
         return np.asarray(self.shares @ space.at_nodes(self.lenders, nodal))
 
 
-def borrowed(space: Any, facets: Any, without: Indices, having: Indices) -> Borrowed | None:
+def borrow(space: Any, facets: Any, without: Indices, having: Indices) -> Borrowed | None:
     """Return what nodes ``without`` pressure borrow of those ``having`` one. Collective.
 
     A pressure here is one of their own. It is None where there are none of either. Both are numbers

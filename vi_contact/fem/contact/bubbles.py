@@ -135,7 +135,7 @@ def _integrals(x: Array) -> tuple[Array, Array]:
     return areas, areas[:, :, None] * np.linalg.solve(gram, products)
 
 
-def averaged(
+def average_bubbles(
     space: FemSpace, facets: Facets, nodes: Nodes, share: sp.csr_matrix | None = None
 ) -> tuple[Facing, ...]:
     """Return the bubbles that displacements of conditions contain, none but in a hierarchy.

@@ -92,10 +92,10 @@ def without(polygons: Array, others: Array, least: Array) -> tuple[Indices, Arra
         kept = (areas(outside) > least) & along.any(axis=1)
         parts.append((owner[kept], outside[kept]))
         inside = cut(inside, start, along)
-    return np.concatenate([part[0] for part in parts]), stacked([part[1] for part in parts])
+    return np.concatenate([part[0] for part in parts]), stack([part[1] for part in parts])
 
 
-def stacked(parts: list[Array]) -> Array:
+def stack(parts: list[Array]) -> Array:
     """Return all polygons of the parts, of as many corners as the largest has."""
     width = max(part.shape[1] for part in parts)
     return np.concatenate(

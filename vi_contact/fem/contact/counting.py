@@ -31,7 +31,9 @@ def census_on_ranks(
         name=name,
         nodes=round(total(comm, len(nodes.numbers))),
         points=round(total(comm, points)),
-        places=_filled({kind: _gathered(comm, nodes.pick(mask)) for kind, mask in kinds.items()}),
+        places=_drop_empty(
+            {kind: _gather_points(comm, nodes.pick(mask)) for kind, mask in kinds.items()}
+        ),
     )
 
 
@@ -45,7 +47,7 @@ def census_of_all(name: str, nodes: Nodes, kinds: Mapping[str, Mask], points: in
         points: number of contact conditions on all ranks.
     """
     places = {kind: nodes.points[mask] for kind, mask in kinds.items()}
-    return Census(name, len(nodes.numbers), points, _filled(places))
+    return Census(name, len(nodes.numbers), points, _drop_empty(places))
 
 
 def tell(comm: Comm, census: Census) -> None:
@@ -57,12 +59,12 @@ def tell(comm: Comm, census: Census) -> None:
         log.info("contact on '%s': %s", census.name, census.in_words())
 
 
-def _gathered(comm: Comm, nodes: Nodes) -> Array:
+def _gather_points(comm: Comm, nodes: Nodes) -> Array:
     """Return coordinates of the nodes of all ranks, by their numbers. Collective."""
     numbers, points = gather_rows(comm, nodes.numbers, nodes.points)
     return np.asarray(points[np.argsort(numbers)])
 
 
-def _filled(places: Mapping[str, Array]) -> dict[str, Array]:
+def _drop_empty(places: Mapping[str, Array]) -> dict[str, Array]:
     """Return the kinds of which there are nodes."""
     return {kind: points for kind, points in places.items() if len(points)}

@@ -90,7 +90,7 @@ class Carried:
     used: Mask
 
 
-def carried_by(covered: Covered, asked: Mask) -> Carried:
+def choose_carriers(covered: Covered, asked: Mask) -> Carried:
     """Return the nodes that are carried of those ``asked`` for (m,).
 
     They are carried by the facets whose middle is the nearest.
@@ -144,7 +144,7 @@ def extrapolation(corners: Array, points: Array) -> Array:
     return np.asarray(wanted @ np.linalg.pinv(known))
 
 
-def overloaded(covered: Covered, carried: Carried, weights: Array) -> Mask:
+def find_overloading(covered: Covered, carried: Carried, weights: Array) -> Mask:
     """Return the carried nodes (m,) that leave too little weight to a node which carries them.
 
     It is too little of its own weight, and of these nodes the one with the largest weight for each.
@@ -187,7 +187,7 @@ class Coupled:
     share: Array
 
 
-def coupled(
+def couple(
     covered: Covered, assembled: Callable[[Carried], tuple[Array, sp.csr_matrix, Array]]
 ) -> Coupled:
     """Return the coupling in which whole facets carry the nodes that have little covered.
@@ -198,9 +198,9 @@ def coupled(
     asked = share < LEAST_SHARE
     # carry all, then take back what would leave a carrying node too little weight, until none does
     while True:
-        carried = carried_by(covered, asked)
+        carried = choose_carriers(covered, asked)
         D, M, overlap = assembled(carried)
-        too_much = overloaded(covered, carried, D)
+        too_much = find_overloading(covered, carried, D)
         if not too_much.any():
             return Coupled(D, M, overlap, carried.nodes, share)
         asked = carried.nodes & ~too_much

@@ -77,7 +77,7 @@ class Boundary:
         return np.unique(connected(k + k * v, *of_facet)[:k], return_inverse=True)[1].ravel()
 
 
-def checked_angle(owner: str, value: Any) -> float:
+def check_angle(owner: str, value: Any) -> float:
     """Return the feature angle as a float; InputError for what is no angle above 0 and up to pi."""
     angle = number(owner, "feature_angle", value, positive=True, unit="radians")
     if angle > np.pi:
@@ -103,7 +103,7 @@ def boundary(space: FemSpace, facets: Facets, *, beyond: float | None = None) ->
     plane = outward(mesh, local, geometry)
     normals = np.repeat(plane[:, None], vertices.shape[1], axis=1)
     if is_curved(mesh) and space.dimension > 1:
-        normals = _curved(space, local, plane)[:, : vertices.shape[1]]
+        normals = _compute_curved_normals(space, local, plane)[:, : vertices.shape[1]]
     if beyond is not None:
         kept = np.isin(vertices, _turning(space, vertices, normals, beyond)).any(axis=1)
         local = local[kept]
@@ -183,7 +183,7 @@ def outward(mesh: Any, facets: Any, geometry: Any) -> Array:
     )
 
 
-def _curved(space: FemSpace, facets: Any, plane: Array) -> Array:
+def _compute_curved_normals(space: FemSpace, facets: Any, plane: Array) -> Array:
     """Return outward unit normals (k, n, d) at the nodes of curved facets.
 
     At a vertex it is at right angles to the tangents of its edges, at mid-points the mean of those

@@ -29,7 +29,7 @@ from ...core.surfaces import (
 )
 from ..mesh.nodal_space import NodalSpace
 from .borrowing import Borrowed
-from .nodes import Nodes, asked, joined_nodes
+from .nodes import Nodes, ask_alike, join_nodes
 
 # least singular value of a node's directions: two that turn by 0.8° (CHOSEN; T has 1 over it)
 INDEPENDENT = 0.01
@@ -169,7 +169,7 @@ class NodalFrames:
             )
 
 
-def snapped(directions: Array) -> Array:
+def snap_to_axes(directions: Array) -> Array:
     """Turn directions to an axis where they are along it to round-off.
 
     Axis-aligned walls stay unrotated.
@@ -178,12 +178,12 @@ def snapped(directions: Array) -> Array:
     return np.asarray(snapped / np.linalg.norm(snapped, axis=1)[:, None])
 
 
-def given(parts: Sequence[NodalConditions]) -> tuple[Indices, Array, Array, Mask]:
+def gather_frame_data(parts: Sequence[NodalConditions]) -> tuple[Indices, Array, Array, Mask]:
     """Return what makes the frames of conditions.
 
     This is numbers and points of their nodes, directions, held components.
     """
-    nodes = joined_nodes([part.nodes for part in parts])
+    nodes = join_nodes([part.nodes for part in parts])
     return (
         nodes.numbers,
         nodes.points,
@@ -205,8 +205,8 @@ def surface_of(space: NodalSpace, parts: Sequence[NodalConditions], **data: Any)
     slots = np.concatenate(
         [start + part.slots for start, part in zip(starts[:-1], parts, strict=True)]
     )
-    frames: NodalFrames = asked(
-        comm, slots, lambda *arrays: (NodalFrames(*arrays),), *given(parts)
+    frames: NodalFrames = ask_alike(
+        comm, slots, lambda *arrays: (NodalFrames(*arrays),), *gather_frame_data(parts)
     )[0]
     # T and T⁻ᵀ, and which unknowns û of a node its conditions and tangents are
     index = space.free_index.reshape(-1, d)[space.blocks_of(frames.numbers)]
@@ -311,7 +311,10 @@ def _coupling(
             directions = frames.blocks[place[rows], :, c]
             entries.append(
                 sum(
-                    (_faced(other, rows, turns, directions, total) for other, turns in faced),
+                    (
+                        _express_faced(other, rows, turns, directions, total)
+                        for other, turns in faced
+                    ),
                     start=diagonal,
                 )
             )
@@ -338,7 +341,7 @@ def _turns(space: NodalSpace, frames: NodalFrames, numbers: Indices) -> Array:
     return np.asarray(np.where(there[:, :1, None] > 0.0, turns, np.eye(d)))
 
 
-def _faced(
+def _express_faced(
     facing: Facing, rows: Indices, turns: Array, directions: Array, total: int
 ) -> sp.csr_matrix:
     """Return coefficients (rows, total) of direction·sum_j P_sj u_j in the unknowns û.

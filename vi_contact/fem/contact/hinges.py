@@ -82,7 +82,7 @@ def hinges(space: FemSpace, numbers: Indices) -> Indices:
     return np.asarray(found[parts > 1])
 
 
-def hinges_of(space: FemSpace, nodes: Nodes) -> Mask:
+def mark_hinges(space: FemSpace, nodes: Nodes) -> Mask:
     """Return which of this rank's nodes are hinges, if they are not clamped. Collective."""
     free = ~nodes.held.all(axis=1)
     numbers = np.unique(np.concatenate(from_each(space.comm, nodes.numbers[free])))
@@ -116,7 +116,7 @@ def refuse_hinges(owner: str, names: Sequence[str], points: Array) -> None:
     )
 
 
-def gathered_points(comm: Comm, nodes: Nodes, chosen: Mask) -> Array:
+def gather_points(comm: Comm, nodes: Nodes, chosen: Mask) -> Array:
     """Return the points of the chosen nodes of all ranks, by their numbers. Collective.
 
     Args:

@@ -13,7 +13,7 @@ from ...core.algebra import Array
 from ...core.corners import tangent_vectors
 from ...core.errors import InputError
 from ...core.surfaces import ContactSurface
-from .frames import FemSurface, NodalFrames, given, surface_of
+from .frames import FemSurface, NodalFrames, gather_frame_data, surface_of
 
 Motion = Callable[[float], Array]
 
@@ -58,13 +58,13 @@ def joined_surfaces(*surfaces: ContactSurface) -> ContactSurface:
     joined = surface_of(
         made[0].space,
         parts,
-        motion=_joined([(surface.motion, (surface.count,)) for surface in made]),
+        motion=_join_motions([(surface.motion, (surface.count,)) for surface in made]),
         companions=tuple(one for surface in made for one in surface.companions),
         watched=tuple(one for surface in made for one in surface.watched),
         censuses=tuple(one for surface in made for one in surface.censuses),
         **data,
     )
-    joined = replace(joined, slide=_slide(made))
+    joined = replace(joined, slide=_join_slides(made))
     return (
         joined.with_frictionless_corners()
         if all(one.frictionless_corners for one in made)
@@ -72,7 +72,7 @@ def joined_surfaces(*surfaces: ContactSurface) -> ContactSurface:
     )
 
 
-def _joined(motions: Sequence[tuple[Motion | None, tuple[int, ...]]]) -> Motion | None:
+def _join_motions(motions: Sequence[tuple[Motion | None, tuple[int, ...]]]) -> Motion | None:
     """Return the motions of all conditions from those of the surfaces."""
     if all(motion is None for motion, _ in motions):
         return None
@@ -81,15 +81,15 @@ def _joined(motions: Sequence[tuple[Motion | None, tuple[int, ...]]]) -> Motion 
     )
 
 
-def _slide(made: Sequence[FemSurface]) -> Motion | None:
+def _join_slides(made: Sequence[FemSurface]) -> Motion | None:
     """Return the slides of all conditions.
 
     Those of nodes with several are along the vectors that are left to them.
     """
-    joined = _joined(
+    joined = _join_motions(
         [(surface.slide, (surface.count, surface.tangents.shape[1])) for surface in made]
     )
-    frames = NodalFrames(*given([part for surface in made for part in surface.parts]))
+    frames = NodalFrames(*gather_frame_data([part for surface in made for part in surface.parts]))
     corners = np.flatnonzero(frames.double[frames.place])
     if joined is None or not len(corners):
         return joined

@@ -32,10 +32,10 @@ import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, Mask
 from ...core.errors import InputError
-from .covering import Carried, Coupled, Covered, coupled, extrapolation
+from .covering import Carried, Coupled, Covered, couple, extrapolation
 from .curves import FARTHER, curvatures, may_overlap
 from .matching import EDGE_ON, Matched, Side, common_nodes, refuse_same_way
-from .mortar_in_space import ROUND_OFF, handed_over, in_space
+from .mortar_in_space import ROUND_OFF, hand_over, in_space
 
 POINTS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)  # of Gauss, on [0, 1], weights ½
 AT_NODE = 1e-9  # of a segment: round-off of where its covered part ends
@@ -148,8 +148,8 @@ def _in_plane(one: Side, two: Side) -> Coupled:
             length = float(np.linalg.norm(ends[1] - ends[0]))
             overlap = _overlap(pieces, ends, ends2, H)
             segments.append(_Segment(facet, ends, pieces, *_integrals(pieces, length), overlap))
-    covered = _covered(segments, common_nodes(one, two) >= 0)
-    return coupled(covered, lambda carried: _assembled(one, two, segments, carried))
+    covered = _measure_cover(segments, common_nodes(one, two) >= 0)
+    return couple(covered, lambda carried: _assemble(one, two, segments, carried))
 
 
 def _overlap(
@@ -173,7 +173,7 @@ def _overlap(
     return float(may_overlap(H[segment], one, two).max())
 
 
-def _covered(segments: list[_Segment], common: Mask) -> Covered:
+def _measure_cover(segments: list[_Segment], common: Mask) -> Covered:
     """Return what is covered of these segments; ``common``: nodes (m,) of both sides."""
     spans = [_span(segment) for segment in segments]
     ends = np.array(spans).reshape(-1, 2)
@@ -201,7 +201,7 @@ def _share(segment: _Segment) -> float:
     return sum(piece[1] - piece[0] for piece in segment.pieces)
 
 
-def _assembled(
+def _assemble(
     one: Side, two: Side, segments: list[_Segment], carried: Carried
 ) -> tuple[Array, sp.csr_matrix, Array]:
     """Return D (m,), M (m, n) and by how much polygons of one curve may overlap (m,) [m].
@@ -232,7 +232,7 @@ def _assembled(
         dual = np.diag(own.sum(axis=1)) @ np.linalg.inv(own)
         common = partner[facet]
         dual, own_D, forces = (
-            array[0] for array in handed_over(dual[None], own.sum(axis=1)[None], common[None] >= 0)
+            array[0] for array in hand_over(dual[None], own.sum(axis=1)[None], common[None] >= 0)
         )
         D[facet] += own_D
         for segment, values in part.mixed.items():

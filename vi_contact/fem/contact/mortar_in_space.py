@@ -22,7 +22,7 @@ import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, Mask
 from .clipping import areas, hats, rule, triangles, turns
-from .covering import Carried, Coupled, Covered, coupled, extrapolation
+from .covering import Carried, Coupled, Covered, couple, extrapolation
 from .curves import FARTHER, curvatures, may_overlap
 from .matching import Side, common_nodes
 from .sight import WHOLE, Facets, Looks, Pieces, facets_of, looks_of, opposite
@@ -63,9 +63,9 @@ def integrals(looks: Looks, pieces: Pieces) -> tuple[Array, Array]:
         other = hats(pieces.seen[piece], points)
         weighted = phi * (weights[:, None] * (areas(corners) / looks.slant[look])[:, None, None])
         weighted = weighted.swapaxes(1, 2)
-        own += summed(piece, weighted @ phi, len(own))
-        mixed += summed(piece, weighted @ other, len(own))
-    return summed(pieces.look, own, k).reshape(k, v, v), mixed.reshape(-1, v, w)
+        own += sum_rows(piece, weighted @ phi, len(own))
+        mixed += sum_rows(piece, weighted @ other, len(own))
+    return sum_rows(pieces.look, own, k).reshape(k, v, v), mixed.reshape(-1, v, w)
 
 
 def _groups_of(orders: Indices) -> Iterator[Indices]:
@@ -95,7 +95,7 @@ def order_of(polygons: Array) -> Indices:
     )
 
 
-def summed(place: Indices, values: Array, count: int) -> Array:
+def sum_rows(place: Indices, values: Array, count: int) -> Array:
     """Return sums of rows of values that have the same place.
 
     Args:
@@ -161,7 +161,7 @@ def entries(values: Array, rows: Indices, columns: Indices, m: int, n: int) -> s
     ).tocoo()
 
 
-def handed_over(functions: Array, D: Array, common: Mask) -> tuple[Array, Array, Array]:
+def hand_over(functions: Array, D: Array, common: Mask) -> tuple[Array, Array, Array]:
     """Let nodes of both sides hand their functions to the others of their facets (``mortar``).
 
     Args:
@@ -217,10 +217,10 @@ class _Block:
         """
         size = areas(self.pieces.polygons)
         looks = self.looks
-        seen = summed(
+        seen = sum_rows(
             self.pieces.look, size[:, None] * self.pieces.polygons.mean(axis=1), len(looks.nodes)
         )
-        seen /= summed(self.pieces.look, size[:, None], len(looks.nodes))
+        seen /= sum_rows(self.pieces.look, size[:, None], len(looks.nodes))
         return looks.middles + np.einsum("kic,kc->ki", looks.frames, seen)
 
 
@@ -246,11 +246,11 @@ def in_space(one: Side, two: Side) -> Coupled:
         some = some.pick(kept)
         pieces = replace(pieces, look=look.ravel())
         blocks.append(_Block(some, pieces, covered[kept], *integrals(some, pieces)))
-    covered_parts = _covered(ours, blocks, common_nodes(one, two) >= 0)
-    return coupled(covered_parts, lambda carried: _assembled(one, two, theirs, blocks, carried))
+    covered_parts = _measure_cover(ours, blocks, common_nodes(one, two) >= 0)
+    return couple(covered_parts, lambda carried: _assemble(one, two, theirs, blocks, carried))
 
 
-def _covered(ours: Facets, blocks: Sequence[_Block], common: Mask) -> Covered:
+def _measure_cover(ours: Facets, blocks: Sequence[_Block], common: Mask) -> Covered:
     """Return what is covered of the looks of these blocks, of each for the nodes that ask.
 
     Args:
@@ -287,10 +287,10 @@ def _whole_weights(looks: Looks) -> Array:
     places, weights = rule(3)
     phi = hats(looks.polygons[piece], np.einsum("qc,kcx->kqx", places, corners))
     sizes = areas(corners) / looks.slant[piece]
-    return summed(piece, np.einsum("q,kqv,k->kv", weights, phi, sizes), k).reshape(k, v)
+    return sum_rows(piece, np.einsum("q,kqv,k->kv", weights, phi, sizes), k).reshape(k, v)
 
 
-def _assembled(
+def _assemble(
     one: Side, two: Side, theirs: Facets, blocks: Sequence[_Block], carried: Carried
 ) -> tuple[Array, sp.csr_matrix, Array]:
     """Return D (m,), M (m, n) and by how much facets of one curved face may overlap (m,) [m].
@@ -325,7 +325,7 @@ def _assembled(
         asking = (some.asking & used & ~borne)[:, :, None]
         common = partner[some.nodes]
         functions = dual(some, own, (block.covered >= 1.0 - WHOLE) & ~borne.any(axis=1))
-        functions, own_D, forces = handed_over(functions, own.sum(axis=2), common >= 0)
+        functions, own_D, forces = hand_over(functions, own.sum(axis=2), common >= 0)
         # their share in M and D, and what they pass to nodes of both sides
         values = (functions * asking)[pieces.look] @ block.mixed
         parts.append(entries(values, some.nodes[pieces.look], theirs.nodes[pieces.facet], m, n))

@@ -59,7 +59,7 @@ class Nodes(Rows):
     unknowns: Indices
 
 
-def joined_nodes(parts: Sequence[Nodes]) -> Nodes:
+def join_nodes(parts: Sequence[Nodes]) -> Nodes:
     """Return the nodes of all parts, one part after the other."""
     return Nodes.join(parts)
 
@@ -69,7 +69,7 @@ def everywhere(comm: Comm, nodes: Nodes) -> Nodes:
 
     It takes about 90 bytes for each in space.
     """
-    every = joined_nodes(from_each(comm, nodes))
+    every = join_nodes(from_each(comm, nodes))
     return every.pick(np.argsort(every.numbers))
 
 
@@ -84,7 +84,7 @@ def slots_of(comm: Comm, keys: Indices) -> Indices:
     )
 
 
-def asked(
+def ask_alike(
     comm: Comm, slots: Indices, ask: Callable[..., tuple[Any, ...]], *values: Any
 ) -> tuple[Any, ...]:
     """Return what ``ask`` answers for this rank's rows of the values.

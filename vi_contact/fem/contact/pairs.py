@@ -31,18 +31,18 @@ from ...core.timing import report_time
 from ...meshes.rows import number_alike
 from ..body.space import FemSpace
 from ..mesh.tagged_mesh import Facets
-from .borrowing import Borrowed, borrowed
-from .bubbles import averaged
+from .borrowing import Borrowed, borrow
+from .bubbles import average_bubbles
 from .counting import census_of_all, tell
 from .covering import LEAST_SHARE
-from .faces import boundary, checked_angle, split, tell_corners
-from .frames import Facing, NodalConditions, snapped, surface_of
+from .faces import boundary, check_angle, split, tell_corners
+from .frames import Facing, NodalConditions, snap_to_axes, surface_of
 from .hinges import hinges as hinge_numbers
 from .hinges import refuse_hinges
 from .matching import Matched, Matching, NodeToNode, Side
-from .nodes import Nodes, everywhere, joined_nodes
-from .surface import contact_space, listed, merged, nodes_on, prescribed_motion
-from .watching import Watched, clamped_or_prescribed, watched_nodes
+from .nodes import Nodes, everywhere, join_nodes
+from .surface import contact_space, find_listed, make_prescribed_motion, merge_tied, nodes_on
+from .watching import Watched, sort_held, watch_nodes
 
 log = logging.getLogger(__name__)
 
@@ -96,13 +96,13 @@ def contact_pair(
             each other, bodies that overlap, sides of one and the same boundary, contact directions
             that are partly prescribed, clamped nodes that face free ones.
     """
-    space, angle = _checked_pair(system, facets1, facets2, points, matching, feature_angle)
+    space, angle = _check_pair(system, facets1, facets2, points, matching, feature_angle)
     flag("contact_pair", "hinges", hinges)
 
     # what faces what: nodes of both sides, and of each face of side 1 what it has in front
     one, two, shared = _two_sides(space, facets1, facets2)
     hinge = _hinges(space, one, two, shared, allowed=hinges)
-    one = replace(one, tied=_tied_over(space, one, two))
+    one = replace(one, tied=_find_tied_over(space, one, two))
     tied = one.nodes.numbers[np.asarray(one.tied) >= 0]
     faces = _faces(space, facets1, one, angle)
     with together(space.comm):  # a matching of the user's may fail on one rank
@@ -117,11 +117,13 @@ def contact_pair(
     kept = ~np.isin(nodes.numbers, np.union1d(two.nodes.numbers, tied))
     nodes = nodes.pick(kept)
     matched = matched.pick(kept)
-    free = _unclamped(space, one.name, nodes, two, matched)
+    free = _find_unclamped(space, one.name, nodes, two, matched)
     kinds = _kinds(one, shared, opposite, nodes.numbers[~free])
-    kinds |= _sorted_out(space, one, kinds["clamped"])
+    kinds |= _sort_held_anywhere(space, one, kinds["clamped"])
     watched = (
-        _watched(space, one, two, nodes.pick(~free), matched.pick(~free)) if points is None else ()
+        _watch_held(space, one, two, nodes.pick(~free), matched.pick(~free))
+        if points is None
+        else ()
     )
     kinds["partly covered"] = np.isin(one.nodes.numbers, carried)
     little = nodes.numbers[free & (matched.shares < LEAST_SHARE)]
@@ -139,11 +141,11 @@ def contact_pair(
 
     # gaps along the normals; nodes that are tied to one another share one condition
     alone = nodes.numbers
-    directions = snapped(nodes.normals)
+    directions = snap_to_axes(nodes.normals)
     gap = _gap(space, one.name, two, nodes, directions, matched)
     P = matched.P
     if len(space.tied_nodes):
-        nodes, directions, shares = merged(space, one.name, nodes, directions, angle)
+        nodes, directions, shares = merge_tied(space, one.name, nodes, directions, angle)
         gap = shares @ gap
         P = sp.csr_matrix(shares @ P)
         kinds["tied to another"] = np.isin(one.nodes.numbers, np.setdiff1d(alone, nodes.numbers))
@@ -155,8 +157,10 @@ def contact_pair(
     slots = np.flatnonzero(space.blocks_of(nodes.numbers) >= 0)
     nodes = nodes.pick(slots)
     tell_corners(space, one.name, nodes, slots, angle)
-    bubbles = averaged(space, facets1, nodes) + averaged(space, facets2, two.nodes, P[slots])
-    beside = _borrowed(space, facets1, one, kinds, nodes.numbers[~uncovered[slots]])
+    bubbles = average_bubbles(space, facets1, nodes) + average_bubbles(
+        space, facets2, two.nodes, P[slots]
+    )
+    beside = _borrow(space, facets1, one, kinds, nodes.numbers[~uncovered[slots]])
     conditions = NodalConditions(
         nodes, directions[slots], slots, Facing(two.nodes, P[slots]), bubbles, beside
     )
@@ -170,10 +174,10 @@ def contact_pair(
     )
     if uncovered.any():
         surface = replace(surface, uncovered=uncovered[slots])
-    return replace(surface, **prescribed_motion(space, conditions))
+    return replace(surface, **make_prescribed_motion(space, conditions))
 
 
-def _checked_pair(
+def _check_pair(
     system: SemiDiscreteSystem,
     facets1: Facets,
     facets2: Facets,
@@ -207,7 +211,7 @@ def _checked_pair(
         ("match",),
         "give NodeToNode() or DualMortar(), or None",
     )
-    angle = checked_angle("contact_pair", feature_angle)
+    angle = check_angle("contact_pair", feature_angle)
     if space.hierarchy is not None and not isinstance(matching or NodeToNode(), NodeToNode):
         raise InputError(
             "contact_pair: sides of P2 tetrahedra are matched by matching=NodeToNode() only: mesh "
@@ -254,7 +258,7 @@ def _pick_listed(
         matched: what they face.
         points: (k, d) coordinates [m].
     """
-    chosen = listed(space, nodes, points, one.name)
+    chosen = find_listed(space, nodes, points, one.name)
     rows = np.concatenate([np.flatnonzero(nodes.numbers == number) for number in chosen])
     others = np.isin(one.nodes.numbers, np.setdiff1d(nodes.numbers, chosen))
     return nodes.pick(rows), matched.pick(rows), others
@@ -314,7 +318,7 @@ def _warn_of_coarse(space: FemSpace, one: Side, two: Side, little: Indices) -> N
         )
 
 
-def _sorted_out(space: FemSpace, one: Side, clamped: Mask) -> dict[str, Mask]:
+def _sort_held_anywhere(space: FemSpace, one: Side, clamped: Mask) -> dict[str, Mask]:
     """Return kind -> mask of the nodes of side 1 held in every component, at rest or moved.
 
     Collective.
@@ -324,12 +328,12 @@ def _sorted_out(space: FemSpace, one: Side, clamped: Mask) -> dict[str, Mask]:
         one: side 1, of m nodes.
         clamped: (m,) nodes held in every component.
     """
-    sorted_out = clamped_or_prescribed(space, one.nodes, clamped)
+    sorted_out = sort_held(space, one.nodes, clamped)
     moved = space.comm.max(sorted_out["prescribed"].astype(float)) > 0.0
     return {"clamped": clamped & ~moved, "prescribed": clamped & moved}
 
 
-def _watched(
+def _watch_held(
     space: FemSpace, one: Side, two: Side, nodes: Nodes, matched: Matched
 ) -> tuple[Watched, ...]:
     """Return what watches nodes of side 1 that are held in every component. Collective.
@@ -348,16 +352,16 @@ def _watched(
     matched = matched.pick(np.flatnonzero(known))
     if not len(nodes.numbers):
         return ()
-    directions = snapped(nodes.normals)
+    directions = snap_to_axes(nodes.normals)
     gap = _gap(space, one.name, two, nodes, directions, matched)
     own = np.flatnonzero(space.blocks_of(nodes.numbers) >= 0)
     opposite = Facing(two.nodes, sp.csr_matrix(matched.P[own]))
-    return watched_nodes(
+    return watch_nodes(
         space, one.name, nodes.pick(own), directions[own], gap[own], opposite, two.name
     )
 
 
-def _borrowed(
+def _borrow(
     space: FemSpace, facets: Facets, one: Side, kinds: dict[str, Mask], having: Indices
 ) -> Borrowed | None:
     """Return what nodes of side 1 without a pressure of their own take of neighbours.
@@ -374,7 +378,7 @@ def _borrowed(
     nothing = [
         mask for kind, mask in kinds.items() if kind not in ("in front of nothing", "not listed")
     ]
-    return borrowed(space, facets, one.nodes.numbers[np.any(nothing, axis=0)], having)
+    return borrow(space, facets, one.nodes.numbers[np.any(nothing, axis=0)], having)
 
 
 def _hinges(space: FemSpace, one: Side, two: Side, shared: Mask, *, allowed: bool) -> Mask:
@@ -403,7 +407,7 @@ def _hinges(space: FemSpace, one: Side, two: Side, shared: Mask, *, allowed: boo
     return np.asarray(here)
 
 
-def _tied_over(space: FemSpace, one: Side, two: Side) -> Indices:
+def _find_tied_over(space: FemSpace, one: Side, two: Side) -> Indices:
     """Return the places (m,) on side 2 of the nodes to which those of side 1 are tied.
 
     They are tied in all components; of several, as where ties meet, the nearest; -1 for others.
@@ -514,7 +518,7 @@ def _by_face(
     if refusal is not None and not found:
         raise refusal
     # all faces together; a node of several of them has several rows, side by side
-    nodes = joined_nodes([nodes for nodes, _ in found])
+    nodes = join_nodes([nodes for nodes, _ in found])
     order = np.arange(len(nodes.numbers))
     if len(found) > 1:
         order = np.argsort(nodes.numbers, kind="stable")
@@ -557,7 +561,7 @@ def _match(side: Side, mean: Array, two: Side, matching: Matching, size: float) 
         raise
 
 
-def _unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched: Matched) -> Mask:
+def _find_unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched: Matched) -> Mask:
     """Return which of the matched nodes are not clamped.
 
     Args:

@@ -16,7 +16,7 @@ from ...core.obstacles import Obstacle, admissible_gap, locate_obstacle
 from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem
 from ..matrices.own_matrices import MatrixSpace
-from .frames import Facing, NodalConditions, snapped, surface_of
+from .frames import Facing, NodalConditions, snap_to_axes, surface_of
 from .nodes import Nodes
 
 OWNER = "contact_points"
@@ -120,7 +120,7 @@ def contact_points(
         gap = admissible_gap(gap, every.points, space.size)
     own = np.flatnonzero(space.blocks_of(numbers) >= 0)
     pairs = None if faced is None else Facing(faced, sp.identity(m, format="csr")[own])
-    part = NodalConditions(every.pick(own), snapped(directions)[own], own, pairs)
+    part = NodalConditions(every.pick(own), snap_to_axes(directions)[own], own, pairs)
     return surface_of(space, [part], gap0=gap[own], weights=area[own])
 
 

@@ -18,7 +18,7 @@ from ...core.checks import at
 from ...core.errors import InputError
 from ...core.surfaces import nodal_frames
 from ...meshes.rows import connected
-from .clipping import areas, cross, overlaps, stacked, turns, without
+from .clipping import areas, cross, overlaps, stack, turns, without
 from .matching import DISTANCES, EDGE_ON, Side
 from .nodes import Nodes, Rows
 
@@ -164,17 +164,17 @@ class Pieces(Rows):
         return np.abs(self.height[:, :1] + np.einsum("kpc,kc->kp", points, self.height[:, 1:]))
 
 
-def joined(parts: list[Pieces]) -> Pieces:
+def join_pieces(parts: list[Pieces]) -> Pieces:
     """Return the pieces of all parts, one part after the other."""
     fields = {
         name: np.concatenate([getattr(part, name) for part in parts])
         for name in Pieces.__dataclass_fields__
         if name != "polygons"
     }
-    return Pieces(polygons=stacked([part.polygons for part in parts]), **fields)
+    return Pieces(polygons=stack([part.polygons for part in parts]), **fields)
 
 
-def shared(looks: Looks, theirs: Facets, look: Indices, facet: Indices) -> Pieces:
+def cut_shared(looks: Looks, theirs: Facets, look: Indices, facet: Indices) -> Pieces:
     """Return what looks share with facets of side 2, where these face each other.
 
     Args:
@@ -224,7 +224,7 @@ def opposite(looks: Looks, theirs: Facets, tree: Any) -> tuple[Pieces, Array]:
     pieces, radius = nearby(looks, theirs, tree)
     sure = complete(pieces, looks, theirs, radius)
     rest = everything(looks, np.flatnonzero(~sure), theirs)
-    pieces = joined([pieces.pick(np.flatnonzero(sure[pieces.look])), *rest])
+    pieces = join_pieces([pieces.pick(np.flatnonzero(sure[pieces.look])), *rest])
     # where several layers lie behind one another, only the nearest counts
     twice = np.bincount(pieces.look, areas(pieces.polygons), count) > (1.0 + WHOLE) * size
     pieces = nearest(pieces, twice | (layers(pieces, theirs, count) > 1), size)
@@ -247,7 +247,7 @@ def nearby(looks: Looks, theirs: Facets, tree: Any) -> tuple[Pieces, Array]:
     few = tree.query_ball_point(looks.middles, radius, return_length=True) <= NEARBY
     near = tree.query_ball_point(looks.middles, np.where(few, radius, 0.0))
     look = np.repeat(np.arange(len(radius)), [len(facets) for facets in near])
-    return shared(looks, theirs, look, np.concatenate(near).astype(np.int64)), radius
+    return cut_shared(looks, theirs, look, np.concatenate(near).astype(np.int64)), radius
 
 
 def complete(pieces: Pieces, looks: Looks, theirs: Facets, radius: Array) -> Mask:
@@ -297,7 +297,7 @@ def everything(looks: Looks, rows: Indices, theirs: Facets) -> Iterator[Pieces]:
     for some in np.array_split(rows, -(-len(rows) * len(theirs.nodes) // DISTANCES)):
         away = beside(looks, some[:, None], theirs.middles)
         look, facet = np.nonzero(away <= (1.0 + WHOLE) * (looks.reach[some, None] + theirs.reach))
-        yield shared(looks, theirs, some[look], facet)
+        yield cut_shared(looks, theirs, some[look], facet)
 
 
 def beside(looks: Looks, rows: Indices, points: Array) -> Array:
@@ -372,8 +372,10 @@ def nearest(pieces: Pieces, several: Mask, size: Array) -> Pieces:
         now = owner[hidden]
         place, rest = without(left[hidden], ours.polygons[hider[now]], least[now])
         owner = np.concatenate([owner[~hidden], now[place]])
-        left = stacked([left[~hidden], rest])
-    return joined([pieces.pick(np.flatnonzero(~among)), replace(ours.pick(owner), polygons=left)])
+        left = stack([left[~hidden], rest])
+    return join_pieces(
+        [pieces.pick(np.flatnonzero(~among)), replace(ours.pick(owner), polygons=left)]
+    )
 
 
 def pairs_of(groups: Indices) -> tuple[Indices, Indices]:

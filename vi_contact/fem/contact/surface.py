@@ -23,15 +23,22 @@ from ...core.timing import report_time
 from ..body.space import FemSpace, space_of
 from ..mesh.group_checks import facets_of
 from ..mesh.tagged_mesh import Facets
-from .borrowing import borrowed
-from .bubbles import averaged
+from .borrowing import borrow
+from .bubbles import average_bubbles
 from .counting import census_on_ranks, tell
-from .faces import boundary, checked_angle, in_symmetry_planes, integrals, split, tell_corners
-from .frames import Facing, NodalConditions, NodalFrames, given, snapped, surface_of
-from .hinges import gathered_points, hinges_of, refuse_hinges
+from .faces import boundary, check_angle, in_symmetry_planes, integrals, split, tell_corners
+from .frames import (
+    Facing,
+    NodalConditions,
+    NodalFrames,
+    gather_frame_data,
+    snap_to_axes,
+    surface_of,
+)
+from .hinges import gather_points, mark_hinges, refuse_hinges
 from .matching import EDGE_ON
-from .nodes import Nodes, asked, everywhere, gather_rows, joined_nodes, slots_of
-from .watching import Watched, clamped_or_prescribed, watched_nodes
+from .nodes import Nodes, ask_alike, everywhere, gather_rows, join_nodes, slots_of
+from .watching import Watched, sort_held, watch_nodes
 
 log = logging.getLogger(__name__)
 
@@ -94,20 +101,20 @@ def contact_surface(
         ("directions", "gap"),
         "give HalfSpace(…) or another",
     )
-    angle = checked_angle("contact_surface", feature_angle)
+    angle = check_angle("contact_surface", feature_angle)
     flag("contact_surface", "hinges", hinges)
     comm = space.comm
 
     # this rank's nodes of the facets, and those of them that are asked for: listed, or not clamped
     every = nodes_on(space, facets)
-    hinge = hinges_of(space, every)
+    hinge = mark_hinges(space, every)
     if not hinges:
-        refuse_hinges("contact_surface", (facets.name,), gathered_points(comm, every, hinge))
+        refuse_hinges("contact_surface", (facets.name,), gather_points(comm, every, hinge))
     if points is None:
         chosen = None
         whole = free_nodes(space, every, facets.name)
     else:
-        chosen = listed(space, everywhere(comm, every), points, facets.name)
+        chosen = find_listed(space, everywhere(comm, every), points, facets.name)
         whole = every.pick(_rows_of(every, chosen))
 
     # one node for each face, the obstacle's answer there, and one condition for each direction
@@ -115,7 +122,7 @@ def contact_surface(
     nodes, _ = split(space, around, whole, angle)
     slots = slots_of(comm, _places(nodes, chosen))
     ask = _obstacle(obstacle, space.size, facets.name, angle, round(total(comm, len(slots))))
-    directions, gap = asked(comm, slots, ask, nodes.points, nodes.normals)
+    directions, gap = ask_alike(comm, slots, ask, nodes.points, nodes.normals)
     nodes, directions, gap = one_per_direction(whole, nodes, directions, gap)
     nodes, directions, gap = with_ties(space, facets.name, nodes, directions, gap, angle)
 
@@ -127,17 +134,17 @@ def contact_surface(
     slots = slots_of(comm, _places(nodes, chosen))
     weights = nodes.weights * space.forms.section.thickness
     tell_corners(space, facets.name, nodes, slots, angle)
-    beside = borrowed(
+    beside = borrow(
         space, facets, every.numbers if chosen is None else every.numbers[:0], nodes.numbers
     )
     conditions = NodalConditions(
-        nodes, directions, slots, bubbles=averaged(space, facets, nodes), borrowed=beside
+        nodes, directions, slots, bubbles=average_bubbles(space, facets, nodes), borrowed=beside
     )
 
     # what became of the nodes without a condition
     held = every.held.all(axis=1)
     kept = np.isin(every.numbers, whole.numbers)
-    kinds = dict(clamped_or_prescribed(space, every, held))
+    kinds = dict(sort_held(space, every, held))
     kinds |= {
         "not listed": ~(held | kept),
         "tied to another": kept & ~np.isin(every.numbers, nodes.numbers),
@@ -145,32 +152,32 @@ def contact_surface(
     watched: tuple[Watched, ...] = ()
     if chosen is None:
         lost, _ = split(space, around, every.pick(held), angle)
-        watched = _watched(space, facets.name, lost, obstacle)
+        watched = _watch_held(space, facets.name, lost, obstacle)
     kinds["shared with another body"] = hinge
     census = census_on_ranks(comm, facets.name, every, kinds, len(slots))
     tell(comm, census)
     surface = surface_of(
         space, [conditions], gap0=gap, weights=weights, censuses=(census,), watched=watched
     )
-    return replace(surface, **prescribed_motion(space, conditions))
+    return replace(surface, **make_prescribed_motion(space, conditions))
 
 
-def prescribed_motion(space: FemSpace, conditions: NodalConditions) -> dict[str, Any]:
+def make_prescribed_motion(space: FemSpace, conditions: NodalConditions) -> dict[str, Any]:
     """Return ``motion`` and ``slide`` of this rank's conditions. Collective.
 
     There are some where what they face, or bubbles are measured from, is moved.
     """
-    parts = _faced_by(conditions)
+    parts = _list_faced(conditions)
     moves = bool(parts) and space.moves
     held = any(part.nodes.held[part.P.indices].any() for part in parts)
     if not moves or not (space.hierarchy or largest(space.comm, held)):
         return {}
-    moved = moved_by_held(space, [conditions])
-    values = space.prescribed_values
+    moved = make_obstacle_motion(space, [conditions])
+    values = space.evaluate_prescribed
     return {"motion": lambda t: moved(values(t))[0], "slide": lambda t: moved(values(t))[1]}
 
 
-def moved_by_held(
+def make_obstacle_motion(
     space: FemSpace, conditions: Sequence[NodalConditions]
 ) -> Callable[[Array], tuple[Array, Array]]:
     """Return a function that tells how far held components move obstacles.
@@ -180,8 +187,8 @@ def moved_by_held(
     collective.
     """
     # which tangents of each condition are free, and its vectors
-    frames = NodalFrames(*given(conditions))
-    free = ~joined_nodes([one.nodes for one in conditions]).held
+    frames = NodalFrames(*gather_frame_data(conditions))
+    free = ~join_nodes([one.nodes for one in conditions]).held
     free = (
         np.take_along_axis(free, tangential_columns(frames.column, space.dimension), axis=1)
         & frames.rubs
@@ -189,7 +196,7 @@ def moved_by_held(
     tangents = tangent_vectors(frames.directions, frames.place)
     directions = frames.directions
     # what conditions face, and shares of it
-    faced = [_faced_by(part) for part in conditions]
+    faced = [_list_faced(part) for part in conditions]
     own = [np.zeros(0, dtype=np.int64), *(part.nodes.numbers for parts in faced for part in parts)]
     numbers = np.unique(np.concatenate(from_each(space.comm, np.concatenate(own))))
     places = [[np.searchsorted(numbers, part.nodes.numbers) for part in parts] for parts in faced]
@@ -211,7 +218,7 @@ def moved_by_held(
     return moved
 
 
-def _faced_by(part: NodalConditions) -> list[Facing]:
+def _list_faced(part: NodalConditions) -> list[Facing]:
     """Return what conditions face, and bubbles that they are measured from."""
     return [other for other in (part.facing, *part.bubbles) if other is not None]
 
@@ -239,12 +246,12 @@ def _obstacle(
         directions, gap = locate_obstacle(
             way, points, normals, name=name, angle=angle, alone=len(points) == count
         )
-        return snapped(directions), admissible_gap(gap, points, size)
+        return snap_to_axes(directions), admissible_gap(gap, points, size)
 
     return ask
 
 
-def _watched(
+def _watch_held(
     space: FemSpace, name: str, nodes: Nodes, obstacle: Obstacle | None
 ) -> tuple[Watched, ...]:
     """Return what watches nodes that are prescribed in every component. Collective.
@@ -259,11 +266,11 @@ def _watched(
         obstacle: what the boundary faces.
     """
     slots = slots_of(space.comm, nodes.numbers)
-    directions, gap = asked(
+    directions, gap = ask_alike(
         space.comm, slots, _looking(obstacle, space.size), nodes.points, nodes.normals
     )
     rows = np.flatnonzero(directions.any(axis=1))
-    return watched_nodes(space, name, nodes.pick(rows), directions[rows], gap[rows])
+    return watch_nodes(space, name, nodes.pick(rows), directions[rows], gap[rows])
 
 
 def _looking(
@@ -287,7 +294,7 @@ def _looking(
             return directions, gap
         cosine = np.sum(ways * normals, axis=1)
         rows = np.flatnonzero(cosine > EDGE_ON * np.linalg.norm(ways, axis=1))
-        directions[rows] = snapped(ways[rows])
+        directions[rows] = snap_to_axes(ways[rows])
         gap[rows] = admissible_gap(gaps[rows], points[rows], size)
         return directions, gap
 
@@ -424,7 +431,9 @@ def free_nodes(space: FemSpace, nodes: Nodes, name: str) -> Nodes:
     return nodes.pick(~clamped)
 
 
-def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], name: str) -> Indices:
+def find_listed(
+    space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], name: str
+) -> Indices:
     """Return the numbers of those nodes that are nearest to the listed points.
 
     The nodes are given of all ranks; the numbers are in the order of the points.
@@ -468,7 +477,7 @@ def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], nam
     return np.asarray(nodes.numbers[rows])
 
 
-def merged(
+def merge_tied(
     space: FemSpace, name: str, nodes: Nodes, directions: Array, angle: float
 ) -> tuple[Nodes, Array, Any]:
     """Return (nodes, directions, shares (k, m)) of the k conditions that are left.
@@ -513,7 +522,7 @@ def merged(
     weights = np.asarray(sums.sum(axis=1)).ravel()
     shares = sp.csr_matrix(sp.diags([1.0 / weights], [0]) @ sums)
     directions = np.where(
-        (np.diff(shares.indptr) > 1)[:, None], snapped(shares @ directions), directions[kept]
+        (np.diff(shares.indptr) > 1)[:, None], snap_to_axes(shares @ directions), directions[kept]
     )
     return replace(nodes.pick(kept), weights=weights), directions, shares
 
@@ -521,7 +530,7 @@ def merged(
 def with_ties(
     space: FemSpace, name: str, nodes: Nodes, directions: Array, gap: Array, angle: float
 ) -> Any:
-    """Return (nodes, directions, gaps) of this rank, those of nodes that move as one ``merged``.
+    """Return (nodes, directions, gaps) of this rank, those of nodes that move as one merged.
 
     Collective.
 
@@ -534,13 +543,13 @@ def with_ties(
         angle: the feature angle [rad].
     """
     tied = np.isin(nodes.numbers, space.tied_nodes)
-    every = joined_nodes(from_each(space.comm, nodes.pick(tied)))
+    every = join_nodes(from_each(space.comm, nodes.pick(tied)))
     ways, gaps = gather_rows(space.comm, directions[tied], gap[tied])
     if not len(gaps):
         return nodes, directions, gap
     # merge those of all ranks, and keep what this rank owns of them
-    every, ways, shares = merged(space, name, every, ways, angle)
+    every, ways, shares = merge_tied(space, name, every, ways, angle)
     own = np.flatnonzero(space.blocks_of(every.numbers) >= 0)
-    nodes = joined_nodes([nodes.pick(~tied), every.pick(own)])
+    nodes = join_nodes([nodes.pick(~tied), every.pick(own)])
     directions = np.concatenate([directions[~tied], ways[own]])
     return nodes, directions, np.concatenate([gap[~tied], (shares @ gaps)[own]])

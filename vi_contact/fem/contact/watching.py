@@ -108,7 +108,7 @@ class Watched:
         The largest displacement [m] is returned too.
         """
         space = self.space
-        values = np.asarray(space.prescribed_values(t)).reshape(-1, space.dimension)
+        values = np.asarray(space.evaluate_prescribed(t)).reshape(-1, space.dimension)
         moved = values[space.blocks_of(self.nodes.numbers)]
         size = np.abs(moved).max(initial=0.0)
         if self.facing is not None:
@@ -117,7 +117,7 @@ class Watched:
         return (towards if self.advance is None else towards + self.advance(t)), float(size)
 
 
-def watched_nodes(
+def watch_nodes(
     space: Any,
     name: str,
     nodes: Nodes,
@@ -144,7 +144,7 @@ def watched_nodes(
     return (Watched(space, name, nodes, directions, gap0, facing, side),)
 
 
-def clamped_or_prescribed(space: Any, nodes: Nodes, mask: Mask) -> Mapping[str, Mask]:
+def sort_held(space: Any, nodes: Nodes, mask: Mask) -> Mapping[str, Mask]:
     """Return kind -> mask (k,) of the nodes in ``mask``.
 
     They are those of this rank, prescribed in every component: those that some condition moves are

@@ -115,11 +115,13 @@ def _reason(pc: Any, mat: Any) -> str:
 
     It is memory, or the matrix, or what MUMPS says of neither.
     """
-    found = [_failed(pc)] if mat.comm.size == 1 else mat.comm.tompi4py().allgather(_failed(pc))
+    found = (
+        [_find_cause(pc)] if mat.comm.size == 1 else mat.comm.tompi4py().allgather(_find_cause(pc))
+    )
     return next((one for one in found if one != "singular"), "singular")
 
 
-def _failed(pc: Any) -> str:
+def _find_cause(pc: Any) -> str:
     if hasattr(pc, "getFailedReason") and pc.getFailedReason() == OUT_OF_MEMORY:
         return "memory"
     if pc.getType() not in ("cholesky", "lu") or pc.getFactorSolverType() != "mumps":

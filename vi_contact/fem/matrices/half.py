@@ -114,9 +114,9 @@ class CompactAlgebra(PetscAlgebra):
         """Return Tᵀ K T."""
         P = as_petsc(T).mat
         A = as_petsc(K).mat
-        rows = self._changed(P, A)
+        rows = self._find_changed_rows(P, A)
         if total(self.comm, len(rows)) > 0.5 * A.getSize()[0]:
-            return self.held(triple_product(A, P))
+            return self.store(triple_product(A, P))
         first, last = A.getOwnershipRange()
         chosen = PETSc.IS().createGeneral((first + rows).astype(PETSc.IntType), comm=A.comm)
         every = PETSc.IS().createStride(last - first, first, 1, comm=A.comm)
@@ -129,7 +129,7 @@ class CompactAlgebra(PetscAlgebra):
         give_back(self.comm.mpi)
         return Replaced(as_petsc(K), rows, part, alike=not largest(self.comm, not alike))
 
-    def held(self, mat: Any) -> PetscMatrix:
+    def store(self, mat: Any) -> PetscMatrix:
         """Return the matrix stored compactly; the given one is destroyed."""
         give_back(self.comm.mpi)
         rows = rows_of(mat)
@@ -139,7 +139,7 @@ class CompactAlgebra(PetscAlgebra):
         kind = PETSc.IntType
         mat.destroy()
         odd, wasted = self.comm.sum(
-            np.array([n % width, 0.0 if n % width or size % width else _wasted(rows, width)])
+            np.array([n % width, 0.0 if n % width or size % width else _count_waste(rows, width)])
         )
         if odd or wasted > 0.0:
             width = 1
@@ -163,7 +163,7 @@ class CompactAlgebra(PetscAlgebra):
         give_back(self.comm.mpi)
         return Half(made)
 
-    def _changed(self, P: Any, A: Any) -> Indices:
+    def _find_changed_rows(self, P: Any, A: Any) -> Indices:
         """Return the owned rows in which PᵀAP may differ from A, ascending. Collective."""
         rows = rows_of(P)
         first = P.getOwnershipRange()[0]
@@ -196,7 +196,7 @@ def algebra_for(
     )
 
 
-def _wasted(rows: sp.csr_matrix, width: int) -> float:
+def _count_waste(rows: sp.csr_matrix, width: int) -> float:
     """Return how many of the entries in blocks are too many, by some nodes all over the rows.
 
     ``width``: unknowns of a node, which a block is of.

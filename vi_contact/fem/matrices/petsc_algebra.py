@@ -261,15 +261,15 @@ class PetscAlgebra:
                     mat.destroy()
         if total is None:
             raise ValueError("combine: give at least one term")
-        return self.held(total)
+        return self.store(total)
 
-    def held(self, mat: Any) -> PetscMatrix:
+    def store(self, mat: Any) -> PetscMatrix:
         """Return a PETSc matrix that nobody else needs as this algebra stores it."""
         return PetscMatrix(mat)
 
     def congruence(self, T: Matrix, K: Matrix) -> Matrix:
         """Return Tᵀ K T."""
-        return self.held(triple_product(as_petsc(K).mat, as_petsc(T).mat))
+        return self.store(triple_product(as_petsc(K).mat, as_petsc(T).mat))
 
     def local(self, rows: Indices, columns: Indices, values: Array, n: int) -> Matrix:
         """Return the matrix of entries between the n unknowns of one rank.

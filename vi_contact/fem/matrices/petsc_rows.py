@@ -12,7 +12,7 @@ def rows_of(mat: Any) -> sp.csr_matrix:
     return sp.csr_matrix((values, columns, ends), shape=(mat.getLocalSize()[0], mat.getSize()[1]))
 
 
-def moved(mat: Any, comm: Any) -> Any:
+def transfer(mat: Any, comm: Any) -> Any:
     """Return a copy of a PETSc AIJ matrix on another communicator of the same ranks.
 
     The matrix is destroyed.

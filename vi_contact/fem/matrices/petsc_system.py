@@ -12,7 +12,7 @@ from ...core.algebra import Array
 from ...core.checks import array, on_all, shown
 from ...core.errors import InputError
 from ...core.system import Load, SemiDiscreteSystem
-from ..mesh.communicators import MpiComm, kept
+from ..mesh.communicators import MpiComm, keep_communicator
 from .own_matrices import own_system
 from .petsc_algebra import PetscAlgebra, PetscMatrix, UnsymmetricAlgebra
 from .petsc_rows import aij_of, rows_of
@@ -68,7 +68,7 @@ def system_from_matrices(
             f"{OWNER}: K is {shown(K)}; give a PETSc.Mat, or scipy matrices to "
             "vc.system_from_arrays"
         )
-    comm = kept(K.comm.tompi4py())
+    comm = keep_communicator(K.comm.tompi4py())
     named = [("M", M), ("K", K)] + ([] if C is None else [("C", C)])
     rows = on_all(MpiComm(comm), OWNER, lambda: {name: _rows(name, A, K) for name, A in named})
     matrices = {name: PetscMatrix(aij_of(one, comm)) for name, one in rows.items()}

@@ -45,7 +45,7 @@ class MpiComm:
         return self.mpi.gather(value, root=0)
 
 
-def kept(comm: Any) -> Any:
+def keep_communicator(comm: Any) -> Any:
     """Return the communicator of the ranks of ``comm`` that lasts as long as the program.
 
     Collective the first time.

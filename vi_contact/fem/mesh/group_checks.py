@@ -83,7 +83,7 @@ def _group(owner: str, meaning: str, group: Any, mesh: Mesh | None, wanted: type
     )
 
 
-def field_given(owner: str, meaning: str, value: Any) -> None:
+def check_field(owner: str, meaning: str, value: Any) -> None:
     """Raise InputError unless it is a function or a vector of numbers.
 
     Size and NaN are told where it is used.
@@ -122,7 +122,7 @@ def components_of(meaning: str, given: tuple[int, ...] | None, dimension: int) -
     return tuple(range(dimension) if given is None else given)
 
 
-def components_given(owner: str, value: Any) -> None:
+def check_components(owner: str, value: Any) -> None:
     """Raise InputError unless it is None or a tuple of whole numbers.
 
     Their range is told where they are used.

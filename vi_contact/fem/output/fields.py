@@ -226,7 +226,7 @@ class FrameWriter:
         )
         slipping = np.zeros(problem.surface.count, dtype=bool)
         if problem.frictional and report is not None:
-            slipping = slipped(report)
+            slipping = find_slipping(report)
         pressure, status = nodal_contact(
             problem, state, np.where(state.active, np.where(slipping, 3, 2), 1)
         )
@@ -365,7 +365,7 @@ def between(problem: ContactProblem, nodal: Array, mean: Any = np.mean) -> Array
     return space.hierarchy.between(nodal, np.isin(space.nodes, middles), mean)
 
 
-def slipped(report: Report) -> Mask:
+def find_slipping(report: Report) -> Mask:
     """Return the points (m,) that moved along their support in a step with friction."""
     step = report.step
     result = report.result
@@ -390,11 +390,11 @@ def _cells_of_body(problem: ContactProblem) -> Cells:
     The order is that of VTK.
     """
     from .. import compat
-    from ..body.space import known_matrices, space_of
+    from ..body.space import space_of, warn_of_other_matrices
 
     space = space_of("XDMF", problem.system)
     if space.forms.tells_stress:
-        known_matrices("XDMF, von_mises", problem.system, "K")
+        warn_of_other_matrices("XDMF, von_mises", problem.system, "K")
     elif space.comm.rank == 0:
         log.info(
             "XDMF: forms=… have no stress, so frames have no von_mises: give fem.Forms(…, stress=)"

@@ -29,7 +29,7 @@ from ...core.problem import ContactProblem
 from ...core.state_checks import check_problem_given, check_sizes
 from ...core.step import State
 from .. import compat
-from ..body.space import FemSpace, known_matrices, space_of
+from ..body.space import FemSpace, space_of, warn_of_other_matrices
 from .fields import between, blocks_of_conditions, nodal_contact
 
 NAMES = ("u", "v", "stress", "contact_pressure")
@@ -53,7 +53,7 @@ def as_function(
     Every call makes a Function of its own. Collective. InputError for a state of another problem,
     and a system without a mesh.
     """
-    space = _checked("as_function", problem, name, continuous)
+    space = _check_request("as_function", problem, name, continuous)
     check_sizes("as_function", problem, state)
     if name != "contact_pressure":
         x, derivative = (state.v, 1) if name == "v" else (state.u, 0)
@@ -65,10 +65,10 @@ def as_function(
             continuous,
         )
     pressure = nodal_contact(problem, state, np.ones(len(state.r_n)))[0]
-    return _function(problem, name, with_borrowed(problem, pressure)[:, 0], state.t)
+    return _function(problem, name, add_borrowed(problem, pressure)[:, 0], state.t)
 
 
-def with_borrowed(problem: ContactProblem, pressure: Array) -> Array:
+def add_borrowed(problem: ContactProblem, pressure: Array) -> Array:
     """Return nodal contact pressures (k, 1) with those of borrowing nodes. Collective.
 
     The nodes of contact boundaries that have none of their own take the mean of those of their
@@ -107,7 +107,7 @@ def read_function(
     last. The run may have had any number of ranks. Collective. InputError for a time without a
     frame, and fields of another mesh.
     """
-    space = _checked("read_function", problem, name, continuous)
+    space = _check_request("read_function", problem, name, continuous)
     optional(number, "read_function", "t", t, unit="s")
     optional(
         instance,
@@ -120,7 +120,9 @@ def read_function(
     kind = "u" if name == "stress" else name
     comm = space.comm
     d = space.dimension
-    points, values, t = comm.bcast(on_root(comm, lambda: _stored(Path(folder), kind, t, frame)))
+    points, values, t = comm.bcast(
+        on_root(comm, lambda: _read_stored(Path(folder), kind, t, frame))
+    )
     fits = len(points) > np.max(space.nodes, initial=-1)
     fits = (
         fits
@@ -135,11 +137,11 @@ def read_function(
         comm,
     )
     if name == "contact_pressure":
-        return _function(problem, name, with_borrowed(problem, values[space.nodes, None])[:, 0], t)
+        return _function(problem, name, add_borrowed(problem, values[space.nodes, None])[:, 0], t)
     return _function(problem, name, values[space.nodes, :d], t, continuous)
 
 
-def _checked(owner: str, problem: Any, name: Any, continuous: Any) -> FemSpace:
+def _check_request(owner: str, problem: Any, name: Any, continuous: Any) -> FemSpace:
     """Return the space of the problem.
 
     Args:
@@ -186,7 +188,7 @@ def _function(
     found.x.array[: values.size] = values
     found.x.scatter_forward()
     if name == "stress":
-        known_matrices("stress", system, "K")
+        warn_of_other_matrices("stress", system, "K")
         found = system.cached(f"stress {continuous}", lambda: Stress(space, continuous))(found, t)
     found.name = name
     return found
@@ -245,7 +247,7 @@ class Stress:
         return found
 
 
-def _stored(
+def _read_stored(
     folder: Path, name: str, t: float | None, frame: int | None
 ) -> tuple[Array, Array, float]:
     """Return points of the mesh, a quantity of a frame at them, and its time."""
@@ -262,7 +264,7 @@ def _stored(
             )
             for grid in index.findall(".//Grid[@GridType='Uniform']")
         )
-        time, place = places[_chosen([time for time, _ in places], t, frame)]
+        time, place = places[_choose_frame([time for time, _ in places], t, frame)]
         file, path = place.split(":")
         known = {str(one.relative_to(folder)): one for one, _ in frames_of(folder).values()}
         with (
@@ -288,7 +290,7 @@ def _stored(
         ) from error
 
 
-def _chosen(times: list[float], t: float | None, frame: int | None) -> int:
+def _choose_frame(times: list[float], t: float | None, frame: int | None) -> int:
     """Return the number of the frame of a time, or of this number.
 
     Args:

@@ -27,8 +27,8 @@ from ..body.conditions import as_tuple
 from ..body.initial_strains import InitialStrain
 from ..body.linear_forms import LOADS, LinearForm, Loads
 from ..body.loads import evaluate
-from ..body.space import known_matrices, space_of
-from ..contact.surface import moved_by_held
+from ..body.space import space_of, warn_of_other_matrices
+from ..contact.surface import make_obstacle_motion
 from ..mesh.group_checks import facets_of
 
 log = logging.getLogger(__name__)
@@ -69,7 +69,7 @@ class NodalWork:
         self, owner: str, problem: ContactProblem, loads: Loads, gravity: Sequence[float] | None
     ) -> None:
         space = space_of("NodalWork", problem.system)
-        known_matrices("reactions and section forces", problem.system, "MCK")
+        warn_of_other_matrices("reactions and section forces", problem.system, "MCK")
         self._problem = problem
         self.space = space
         # known to the body
@@ -87,20 +87,22 @@ class NodalWork:
         self._r = compat.function(space.V)
         self._inside = compat.function(compat.cell_space(space.mesh))
         self._forms = [
-            space.compiled(space.forms.against(name, self._r, self._inside))
+            space.compile_form(space.forms.against(name, self._r, self._inside))
             if name != "C" or space.forms.damped
             else None
             for name in ("K", "C", "M")
         ]
         self._initial = [] if space.forms.initial is None else [space.forms.initial]
-        self._forms += [space.compiled(one.against(self._r, self._inside)) for one in self._initial]
+        self._forms += [
+            space.compile_form(one.against(self._r, self._inside)) for one in self._initial
+        ]
         g = ufl.TestFunction(space.V)
         mesh = space.mesh
         h = space.forms.section.thickness
         self._load_forms = [  # their products with nodal values of the loads are rᵀf
             None
             if isinstance(load, LinearForm)
-            else space.compiled(
+            else space.compile_form(
                 h * self._inside * ufl.inner(self._r, load.acting(g, mesh)) * load.measure(mesh)
             )
             for load in self._loads
@@ -157,7 +159,7 @@ class NodalWork:
         densities += [(ours.section.thickness, load) for load in self._loads]
         rows: list[list[Any]] = [[] for _ in forms]
         moved = (
-            [moved_by_held(self.space, made)]
+            [make_obstacle_motion(self.space, made)]
             if (made := getattr(self._problem.surface, "parts", ()))
             else []
         )
