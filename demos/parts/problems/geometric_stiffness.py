@@ -55,7 +55,7 @@ def geometric_stiffness(problem: ContactProblem, state: State) -> SemiDiscreteSy
     warn_of_other_matrices("geometric_stiffness", system, "K")
     u0 = problem.cartesian(state.u)
     full = initial_stress_matrix(space, space.expand(u0, state.t), state.t)
-    reduce = PetscMatrix(space.reduced(full))
+    reduced = PetscMatrix(space.reduce(full))
     load = replace(system.load, constant=system.load.constant + reduced @ u0)
     if any(condition.moves for condition in space.prescribed):
         load = _with_prescribed(space, PetscMatrix(full), load, state.t)
