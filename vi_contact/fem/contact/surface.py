@@ -204,7 +204,7 @@ def make_obstacle_motion(
     def moved(nodal: Array) -> tuple[Array, Array]:
         nodal = nodal.reshape(-1, space.dimension)
         if space.hierarchy is not None:
-            nodal = space.hierarchy.bent(nodal)
+            nodal = space.hierarchy.split_bubbles(nodal)
         values = space.at_nodes(numbers, nodal)
         motions = []
         for part, others, where in zip(conditions, faced, places, strict=True):
