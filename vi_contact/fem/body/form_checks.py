@@ -1,6 +1,7 @@
 """Check the forms that a user gives for a body.
 
-They are functions, bilinear, of this mesh; matrices are finite, masses positive.
+They must be functions that return bilinear forms of its mesh, with finite matrices and a positive
+mass.
 """
 
 from collections.abc import Callable
@@ -21,7 +22,7 @@ from .. import compat
 from ..matrices.petsc_algebra import PetscMatrix
 from .space import FemSpace
 
-PROBES = 4
+PROBES = 4  # motions without a meaning whose kinetic energy is tried
 
 
 def refuse_complex(owner: str) -> None:
@@ -77,17 +78,17 @@ def form_of(said: str, call: Callable[..., Any], space: FemSpace, *arguments: An
         )
     on_all(space.comm, said, lambda: refuse_not_linear(said, form))
     own = space.mesh.ufl_domain().ufl_id()
-    functions = (getattr(one, "function_space", space.V) for one in form.coefficients())
-    if any(one.ufl_id() != own for one in form.ufl_domains()) or any(
-        V.mesh is not space.mesh for V in functions
-    ):
+    spaces = [getattr(part, "function_space", space.V) for part in form.coefficients()]
+    elsewhere = any(domain.ufl_id() != own for domain in form.ufl_domains())
+    if elsewhere or any(V.mesh is not space.mesh for V in spaces):
         raise InputError(
             f"{said} is of another mesh; give measures and Functions of the mesh of the body"
         )
-    if any(one.integral_type() == "interior_facet" for one in form.integrals()):
+    if any(integral.integral_type() == "interior_facet" for integral in form.integrals()):
+        # with ghosts of nodes alone no rank knows both cells of a facet between ranks
         maps = space.V.dofmap.index_map, space.mesh.topology.index_map(space.mesh.topology.dim)
-        nodes, cells = space.comm.sum(np.array([one.num_ghosts for one in maps]))
-        if nodes and not cells:  # no rank knows both cells of a facet between ranks
+        nodes, cells = space.comm.sum(np.array([local.num_ghosts for local in maps]))
+        if nodes and not cells:
             raise InputError(
                 f"{said} integrates over interior facets (dS), which on several ranks needs a mesh "
                 "with ghost_mode=shared_facet"
@@ -96,7 +97,14 @@ def form_of(said: str, call: Callable[..., Any], space: FemSpace, *arguments: An
 
 
 def refuse_not_linear(said: str, form: Any) -> None:
-    """Ask UFL here, on every rank: the compiler asks on one, and the others would wait for it."""
+    """Raise InputError unless UFL finds a form linear in its arguments.
+
+    It is asked here, on every rank: the compiler asks on one, and the others would wait for it.
+
+    Args:
+        said: the beginning of messages.
+        form: the form.
+    """
     try:
         compute_form_data(form)
     except (ArityMismatch, TypeError, ValueError):
@@ -128,9 +136,10 @@ def is_symmetric(matrix: Any, space: FemSpace) -> bool:
 
 
 def refuse_masses(matrix: Any, space: FemSpace) -> None:
-    """Raise InputError unless a full mass matrix is symmetric and positive.
+    """Raise InputError unless a full mass matrix is symmetric and positive. Collective.
 
-    Its diagonal and some products tell.
+    Its diagonal tells, and the kinetic energies of translations and of ``PROBES`` other motions:
+    necessary conditions, for eigenvalues would cost more than the run.
     """
     M = PetscMatrix(matrix)
     if not is_symmetric(matrix, space):
@@ -148,7 +157,7 @@ def refuse_masses(matrix: Any, space: FemSpace) -> None:
 
 
 def _numbers(space: FemSpace) -> Any:
-    """Numbers of all owned components, prescribed ones too."""
+    """Return the numbers of all owned components on any ranks, prescribed ones too."""
     return (space.nodes[:, None] * space.dimension + np.arange(space.dimension)).ravel()
 
 
@@ -156,6 +165,10 @@ def refuse_stress(call: Callable[[Any], Any], space: FemSpace) -> None:
     """Raise InputError unless call(u) is a tensor of UFL, (d, d) or in the plane (3, 3).
 
     Collective.
+
+    Args:
+        call: the user's function.
+        space: that of the displacement.
     """
     d = space.dimension
     u = compat.function(space.V)
