@@ -24,7 +24,7 @@ from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.fem.body.assembly import assemble
 from vi_contact.fem.body.loads import BodyForce, Prescribed
-from vi_contact.fem.contact.clipping import areas, hats, overlaps, rule, without
+from vi_contact.fem.contact.clipping import areas, hats, intersect, rule, subtract
 from vi_contact.fem.contact.joined import joined_surfaces
 from vi_contact.fem.contact.matching import Matched, Side
 from vi_contact.fem.contact.mortar import DualMortar
@@ -129,11 +129,11 @@ def test_polygons():
     square = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
     one = square + 0.3 * random.random((200, 4, 2))
     two = np.array([(0.2, -0.3), (1.4, 0.5), (-0.1, 0.8)]) + 0.3 * random.random((200, 3, 2))
-    common = areas(overlaps(one, two))
-    assert common.min() > 0.1 and common == pytest.approx(areas(overlaps(two, one)), rel=1e-12)
-    owner, parts = without(one, two, np.zeros(200))
+    common = areas(intersect(one, two))
+    assert common.min() > 0.1 and common == pytest.approx(areas(intersect(two, one)), rel=1e-12)
+    owner, parts = subtract(one, two, np.zeros(200))
     assert np.bincount(owner, areas(parts), 200) + common == pytest.approx(areas(one))
-    assert not areas(overlaps(one, two + 9.0)).any()
+    assert not areas(intersect(one, two + 9.0)).any()
     places, weights = rule(3)
     x, y = places[:, 0], places[:, 1]
     # 2 a! b! / (a + b + 2)!

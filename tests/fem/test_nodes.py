@@ -18,7 +18,7 @@ from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem
 from vi_contact.fem.body.assembly import assemble
-from vi_contact.fem.contact.faces import boundary
+from vi_contact.fem.contact.faces import gather_boundary
 from vi_contact.fem.contact.nodes import asked, slots_of
 from vi_contact.fem.contact.surface import contact_surface, nodes_on
 from vi_contact.fem.mesh.communicators import MpiComm
@@ -62,7 +62,7 @@ def test_numbers_alone_are_gathered():
     Friction and redistributed mass gather shared neighbours only."""
     system, tags = body()
     space, friction = system.space, Coulomb(0.3)
-    assert not len(boundary(space, tags["bottom"], beyond=0.5).vertices)
+    assert not len(gather_boundary(space, tags["bottom"], beyond=0.5).vertices)
     space.comm = system.algebra.comm = weighed = Weighed(COMM)
     surface = contact_surface(system, tags["bottom"])
     # up to two cuts, seen from both sides: number and box

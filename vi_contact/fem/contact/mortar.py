@@ -43,17 +43,17 @@ AT_NODE = 1e-9  # of a segment: round-off of where its covered part ends
 
 @dataclass(frozen=True)
 class DualMortar:
-    """Match sides of plane and solid bodies with any meshes by the dual mortar method.
-
-    It has dual Lagrange multipliers.
+    """Match sides of plane and solid bodies with any meshes by dual Lagrange multipliers.
 
     A node of side 1 beyond the edge of side 2 keeps its condition, in the mean over what is
     covered, where that is at least half of its share of the facets around it; else the nodes inside
     carry it, and it has none (``covering``). Initial gaps are means too; where facets of the same
     curved face overlap by no more than their distance from it, some h²/(8R) on a curve of radius R,
-    the gap is zero (``fem.contact.curves``). Plane sides may overlap by round-off only. InputError
-    for bars, for sides that do not face each other, in space for facets that are slivers or not
-    convex.
+    the gap is zero (``fem.contact.curves``). Plane sides may overlap by round-off only.
+
+    Raises:
+        InputError: from ``match``, for bars, for facets of second order, for sides that do not face
+            each other, in space for facets that are slivers or not convex.
     """
 
     partial: ClassVar[bool] = True  # parts of side 1 in front of nothing have no conditions
@@ -81,7 +81,7 @@ class DualMortar:
         coupling = in_space(one, two) if d == 3 else _in_plane(one, two)
         D = coupling.D
         if not (D > 0.0).any():
-            _refuse(one, two)
+            _refuse_apart(one, two)
         # P = D⁻¹ M, at the nodes that have a function
         rows = np.flatnonzero(D > 0.0)
         P = sp.csr_matrix(sp.diags([1.0 / D[rows]], [0]) @ coupling.M[rows])
@@ -89,7 +89,7 @@ class DualMortar:
         return Matched(rows, P, D[rows], coupling.overlap[rows], coupling.share[rows], carried)
 
 
-def _refuse(one: Side, two: Side) -> None:
+def _refuse_apart(one: Side, two: Side) -> None:
     """Raise InputError for sides of which no part lies opposite the other."""
     some, others = (
         side.nodes.normals[:: 1 + len(side.nodes.normals) // 1000] for side in (one, two)
@@ -106,10 +106,14 @@ def _refuse(one: Side, two: Side) -> None:
 class _Segment:
     """Hold a segment of side 1 in front of side 2.
 
+    The coordinate along a segment is 0 at its first node and 1 at its second one.
+
     Attributes:
         nodes: (2,) its nodes.
         ends: (2, 2) their points [m].
-        pieces: (low, high, segment of side 2, its coordinates at low and high) of each piece.
+        pieces: its pieces in front of one segment of side 2 each: coordinates low and high where
+            the piece begins and ends, number of the segment of side 2, and (2,) coordinates there
+            of what lies opposite low and high.
         own: (2, 2) ∫ phi phiᵀ over the pieces [m].
         mixed: by segment of side 2, (2, 2) ∫ phi_i phi_j [m].
         overlap: by how much polygons of one curve may overlap on it [m].
@@ -134,25 +138,26 @@ class _Segment:
 
 
 def _in_plane(one: Side, two: Side) -> Coupled:
-    """Integrate the coupling of sides of plane bodies."""
+    """Couple sides of plane bodies: find pieces, see what they cover, then assemble D and M."""
     ends1 = one.nodes.points[one.facets]
     ends2 = two.nodes.points[two.facets]
     normals1 = _normals(one, ends1)
     normals2 = _normals(two, ends2)
     H = curvatures(ends2, two.facets, normals2)
+
     segments = []
     # project side 2 onto each segment of side 1, and integrate over the pieces that this makes
     for facet, ends, normal in zip(one.facets, ends1, normals1, strict=True):
         pieces = list(_pieces(ends, normal, ends2, normals2))
         if sum(high - low for low, high, *_ in pieces) > ROUND_OFF:
             length = float(np.linalg.norm(ends[1] - ends[0]))
-            overlap = _overlap(pieces, ends, ends2, H)
-            segments.append(_Segment(facet, ends, pieces, *_integrals(pieces, length), overlap))
+            overlap = _find_overlap(pieces, ends, ends2, H)
+            segments.append(_Segment(facet, ends, pieces, *_integrate(pieces, length), overlap))
     covered = _measure_cover(segments, common_nodes(one, two) >= 0)
     return couple(covered, lambda carried: _assemble(one, two, segments, carried))
 
 
-def _overlap(
+def _find_overlap(
     pieces: list[tuple[float, float, int, Array]], ends: Array, ends2: Array, H: Array
 ) -> float:
     """Return by how much the polygon of side 2 may overlap a segment of side 1 [m].
@@ -174,7 +179,10 @@ def _overlap(
 
 
 def _measure_cover(segments: list[_Segment], common: Mask) -> Covered:
-    """Return what is covered of these segments; ``common``: nodes (m,) of both sides."""
+    """Measure what is covered of segments; ``common``: (m,) nodes of side 1 that side 2 has too.
+
+    Segments without anything in front of them are not among these. There may be none at all.
+    """
     spans = [_span(segment) for segment in segments]
     ends = np.array(spans).reshape(-1, 2)
     corners = np.array([segment.ends for segment in segments]).reshape(-1, 2, 2)
@@ -224,16 +232,18 @@ def _assemble(
         facet = part.nodes
         own = part.own
         overlap[facet] = np.maximum(overlap[facet], part.overlap)
+        # a node that is carried has its share on the nodes of another segment
         if carried.nodes[facet].any():
             overlap[by] = np.maximum(overlap[by], FARTHER * part.overlap)
             _carry(D, M, one.nodes.points, two.facets, part, by, carried.nodes)
             continue
-        # psi = A phi; nodes of both sides hand their functions over
+        # psi = A phi with A = diag(∫ phi) (∫ phi phiᵀ)⁻¹; nodes of both sides hand theirs over
         dual = np.diag(own.sum(axis=1)) @ np.linalg.inv(own)
         common = partner[facet]
         dual, own_D, forces = (
             array[0] for array in hand_over(dual[None], own.sum(axis=1)[None], common[None] >= 0)
         )
+        # D_s = ∫ psi_s, M_sj = ∫ psi_s phi_j, and what is passed on to nodes t of both sides
         D[facet] += own_D
         for segment, values in part.mixed.items():
             for j, column in zip(two.facets[segment], (dual @ values).T, strict=True):
@@ -253,7 +263,7 @@ def _carry(
     by: Indices,
     carried: Mask,
 ) -> None:
-    """Add to D and M what a segment adds of which some node is carried (``covering``).
+    """Add the share of a segment with a carried node to D and M, as ``covering`` says.
 
     Args:
         D: (m,) ∫ psi of each node of side 1; it is added to.
@@ -270,10 +280,12 @@ def _carry(
     there = part.places(points[by])[None, :, None]
     shares = extrapolation(there, part.places(part.ends)[None, :, None])[0]
     for i, (node, weight) in enumerate(zip(part.nodes, weights, strict=True)):
-        for k, share in zip(by, shares[i], strict=True) if carried[node] else ((node, 1.0),):
+        # who has the condition of this node: the nodes that carry it, or itself
+        carriers = zip(by, shares[i], strict=True) if carried[node] else [(node, 1.0)]
+        for k, share in carriers:
             place = float(part.places(points[k]))
             D[k] += share * weight
-            # of the functions of the segment, which span (1, x)
+            # psi_k = D_k b(x)ᵀ (∫ b bᵀ)⁻¹ b(x_k), with b = phi of the segment, which spans (1, x)
             psi = share * weight * _hats(place) @ inverse
             for segment, values in part.mixed.items():
                 M[k, facets2[segment]] = M[k, facets2[segment]].toarray().ravel() + psi @ values
@@ -322,12 +334,14 @@ def _pieces(
             yield start, end, segment, (np.array([start, end]) - place[segment, 0]) / slope[nearest]
 
 
-def _integrals(
+def _integrate(
     pieces: list[tuple[float, float, int, Array]], length: float
 ) -> tuple[Array, dict[int, Array]]:
-    """Return ∫ phi phiᵀ (2, 2) over the pieces, and by segment of side 2 ∫ phi_i phi_j (2, 2).
+    """Return ∫ phi phiᵀ (2, 2) [m] over the pieces, and by segment of side 2 ∫ phi_i phi_j (2, 2).
 
-    ``length``: that of the segment of side 1 [m].
+    Args:
+        pieces: those of a segment of side 1.
+        length: that of this segment [m].
     """
     own = np.zeros((2, 2))
     mixed: dict[int, Array] = {}

@@ -35,7 +35,7 @@ from .borrowing import Borrowed, borrow
 from .bubbles import average_bubbles
 from .counting import census_of_all, tell
 from .covering import LEAST_SHARE
-from .faces import boundary, check_angle, split, tell_corners
+from .faces import check_angle, gather_boundary, split_at_corners, tell_corners
 from .frames import Facing, NodalConditions, snap_to_axes, surface_of
 from .hinges import hinges as hinge_numbers
 from .hinges import refuse_hinges
@@ -461,10 +461,10 @@ def _faces(space: FemSpace, facets1: Facets, one: Side, angle: float) -> list[tu
         InputError: a face that meets itself.
     """
     # the facets of all ranks are gathered only where some of them may turn so far
-    around = boundary(space, facets1, beyond=angle)
+    around = gather_boundary(space, facets1, beyond=angle)
     if len(around.vertices):
-        around = boundary(space, facets1)
-    nodes, facet = split(space, around, one.nodes, angle)
+        around = gather_boundary(space, facets1)
+    nodes, facet = split_at_corners(space, around, one.nodes, angle)
     if len(nodes.numbers) == len(one.nodes.numbers):
         return [(one, one.nodes.normals)]
     face_of = around.faces(angle)

@@ -26,7 +26,14 @@ from ..mesh.tagged_mesh import Facets
 from .borrowing import borrow
 from .bubbles import average_bubbles
 from .counting import census_on_ranks, tell
-from .faces import boundary, check_angle, in_symmetry_planes, integrals, split, tell_corners
+from .faces import (
+    check_angle,
+    gather_boundary,
+    in_symmetry_planes,
+    integrate_nodal,
+    split_at_corners,
+    tell_corners,
+)
 from .frames import (
     Facing,
     NodalConditions,
@@ -118,8 +125,8 @@ def contact_surface(
         whole = every.pick(_rows_of(every, chosen))
 
     # one node for each face, the obstacle's answer there, and one condition for each direction
-    around = boundary(space, facets, beyond=angle)
-    nodes, _ = split(space, around, whole, angle)
+    around = gather_boundary(space, facets, beyond=angle)
+    nodes, _ = split_at_corners(space, around, whole, angle)
     slots = slots_of(comm, _places(nodes, chosen))
     ask = _obstacle(obstacle, space.size, facets.name, angle, round(total(comm, len(slots))))
     directions, gap = ask_alike(comm, slots, ask, nodes.points, nodes.normals)
@@ -151,7 +158,7 @@ def contact_surface(
     }
     watched: tuple[Watched, ...] = ()
     if chosen is None:
-        lost, _ = split(space, around, every.pick(held), angle)
+        lost, _ = split_at_corners(space, around, every.pick(held), angle)
         watched = _watch_held(space, facets.name, lost, obstacle)
     kinds["shared with another body"] = hinge
     census = census_on_ranks(comm, facets.name, every, kinds, len(slots))
@@ -387,7 +394,7 @@ def contact_space(
 
 def nodes_on(space: FemSpace, facets: Facets) -> Nodes:
     """Return this rank's nodes of the facets, ordered by original node number. Collective."""
-    values = integrals(space, facets.indices)
+    values = integrate_nodal(space, facets.indices)
     blocks = space.facet_blocks(facets.indices)
     if space.hierarchy is not None:
         blocks = np.intersect1d(blocks, space.hierarchy.vertices[1])
