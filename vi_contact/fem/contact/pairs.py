@@ -1,6 +1,4 @@
-"""Make contact between two deformable bodies.
-
-The unknowns of side 1 become displacements relative to side 2.
+"""Make contact between two deformable bodies: unknowns of side 1 relative to side 2.
 
 Opposite node s of side 1 with frame Q_s = (n, t), the other body moves by sum_j P_sj u_j. With û_s
 = Q_sᵀ u_s, the unknowns û of the nodal frames are written in new ones ǔ,
@@ -11,6 +9,10 @@ so that the relative normal displacement ǔ_n is one unknown again: ǔ_n <= gap0
 friction acts on ǔ_t, and the work of a reaction on ǔ is that of the pair of forces r on side 1 and
 -P_sjᵀ r on side 2: action is reaction. n is the outward normal of side 1, from side 1 to side 2.
 Displacements are small: nobody's partner changes.
+
+Both sides are gathered on every rank, which all do the same work up to the gaps; then each keeps the
+conditions of its own nodes. Sides are ``Side`` (``matching``), what nodes of side 1 face is
+``Matched``; ``_match_faces`` matches the faces of side 1 one by one.
 """
 
 import logging
@@ -37,8 +39,7 @@ from .counting import census_of_all, tell
 from .covering import LEAST_SHARE
 from .faces import check_angle, gather_boundary, split_at_corners, tell_corners
 from .frames import Facing, NodalConditions, snap_to_axes, surface_of
-from .hinges import hinges as hinge_numbers
-from .hinges import refuse_hinges
+from .hinges import find_hinges, refuse_hinges
 from .matching import Matched, Matching, NodeToNode, Side
 from .nodes import Nodes, everywhere, join_nodes
 from .surface import contact_space, find_listed, make_prescribed_motion, merge_tied, nodes_on
@@ -98,27 +99,27 @@ def contact_pair(
     """
     space, angle = _check_pair(system, facets1, facets2, points, matching, feature_angle)
     flag("contact_pair", "hinges", hinges)
+    if matching is None:
+        matching = NodeToNode()
 
     # what faces what: nodes of both sides, and of each face of side 1 what it has in front
     one, two, shared = _two_sides(space, facets1, facets2)
-    hinge = _hinges(space, one, two, shared, allowed=hinges)
+    hinge = _mark_hinges(space, one, two, shared, allowed=hinges)
     one = replace(one, tied=_find_tied_over(space, one, two))
     tied = one.nodes.numbers[np.asarray(one.tied) >= 0]
-    faces = _faces(space, facets1, one, angle)
+    faces = _divide_faces(space, facets1, one, angle)
     with together(space.comm):  # a matching of the user's may fail on one rank
-        nodes, matched = _by_face(
-            faces, two, NodeToNode() if matching is None else matching, space.size
-        )
+        nodes, matched = _match_faces(faces, two, matching, space.size)
     opposite = np.concatenate([nodes.numbers, matched.carried])
     carried = np.setdiff1d(matched.carried, nodes.numbers)
 
     # which nodes have a condition, and what became of the others: those of both sides, tied over,
     # clamped or prescribed, hardly covered, not listed
-    kept = ~np.isin(nodes.numbers, np.union1d(two.nodes.numbers, tied))
-    nodes = nodes.pick(kept)
-    matched = matched.pick(kept)
+    can_part = ~np.isin(nodes.numbers, np.union1d(two.nodes.numbers, tied))
+    nodes = nodes.pick(can_part)
+    matched = matched.pick(can_part)
     free = _find_unclamped(space, one.name, nodes, two, matched)
-    kinds = _kinds(one, shared, opposite, nodes.numbers[~free])
+    kinds = _sort_kinds(one, shared, opposite, nodes.numbers[~free])
     kinds |= _sort_held_anywhere(space, one, kinds["clamped"])
     watched = (
         _watch_held(space, one, two, nodes.pick(~free), matched.pick(~free))
@@ -142,7 +143,7 @@ def contact_pair(
     # gaps along the normals; nodes that are tied to one another share one condition
     alone = nodes.numbers
     directions = snap_to_axes(nodes.normals)
-    gap = _gap(space, one.name, two, nodes, directions, matched)
+    gap = _measure_gap(space, one.name, two, nodes, directions, matched)
     P = matched.P
     if len(space.tied_nodes):
         nodes, directions, shares = merge_tied(space, one.name, nodes, directions, angle)
@@ -150,30 +151,38 @@ def contact_pair(
         P = sp.csr_matrix(shares @ P)
         kinds["tied to another"] = np.isin(one.nodes.numbers, np.setdiff1d(alone, nodes.numbers))
     uncovered = np.isin(nodes.numbers, little)
+    some_uncovered = bool(uncovered.any())
     census = census_of_all(one.name, one.nodes, kinds, len(nodes.numbers))
     tell(space.comm, census)
 
     # from here on every rank has its own nodes of side 1
     slots = np.flatnonzero(space.blocks_of(nodes.numbers) >= 0)
     nodes = nodes.pick(slots)
+    directions = directions[slots]
+    gap = gap[slots]
+    P = P[slots]
+    uncovered = uncovered[slots]
     tell_corners(space, one.name, nodes, slots, angle)
-    bubbles = average_bubbles(space, facets1, nodes) + average_bubbles(
-        space, facets2, two.nodes, P[slots]
-    )
-    beside = _borrow(space, facets1, one, kinds, nodes.numbers[~uncovered[slots]])
+    own_bubbles = average_bubbles(space, facets1, nodes)
+    their_bubbles = average_bubbles(space, facets2, two.nodes, P)
     conditions = NodalConditions(
-        nodes, directions[slots], slots, Facing(two.nodes, P[slots]), bubbles, beside
+        nodes,
+        directions,
+        slots,
+        facing=Facing(two.nodes, P),
+        bubbles=own_bubbles + their_bubbles,
+        borrowed=_borrow(space, facets1, one, kinds, nodes.numbers[~uncovered]),
     )
     surface = surface_of(
         space,
         [conditions],
-        gap0=gap[slots],
+        gap0=gap,
         weights=nodes.weights * space.forms.section.thickness,
         censuses=(census,),
         watched=watched,
     )
-    if uncovered.any():
-        surface = replace(surface, uncovered=uncovered[slots])
+    if some_uncovered:
+        surface = replace(surface, uncovered=uncovered)
     return replace(surface, **make_prescribed_motion(space, conditions))
 
 
@@ -185,15 +194,18 @@ def _check_pair(
     matching: Matching | None,
     feature_angle: float,
 ) -> tuple[FemSpace, float]:
-    """Return the space of the system and the angle [rad]; InputError for wrong arguments.
+    """Return the space of the system and the feature angle as a float [rad]. Collective.
 
     Args:
         system: the system of both bodies.
         facets1: side 1.
         facets2: side 2.
         points: a list of coordinates, or None.
-        matching: how nodes find what they face.
+        matching: how nodes find what they face, or None.
         feature_angle: [rad].
+
+    Raises:
+        InputError: on all ranks, wrong arguments.
     """
     space = contact_space(
         "contact_pair",
@@ -221,14 +233,15 @@ def _check_pair(
 
 
 def _two_sides(space: FemSpace, facets1: Facets, facets2: Facets) -> tuple[Side, Side, Mask]:
-    """Return both sides, and which nodes of side 1 are shared; InputError unless they can part.
-
-    Collective.
+    """Return both sides, and a mask of the nodes of side 1 that side 2 has too. Collective.
 
     Args:
         space: the bodies' unknowns.
         facets1: side 1.
         facets2: side 2.
+
+    Raises:
+        InputError: sides of the same nodes, and a facet on both sides: nothing can part there.
     """
     one = side_of(space, facets1)
     two = side_of(space, facets2)
@@ -249,7 +262,7 @@ def _pick_listed(
     matched: Matched,
     points: Sequence[Sequence[float]],
 ) -> tuple[Nodes, Matched, Mask]:
-    """Return the nodes nearest to the points, in their order, and which of side 1 are not.
+    """Return the conditions at the nodes nearest to points, in their order, and who is left out.
 
     Args:
         space: the bodies' unknowns.
@@ -257,6 +270,9 @@ def _pick_listed(
         nodes: those of it with a condition.
         matched: what they face.
         points: (k, d) coordinates [m].
+
+    Returns:
+        nodes and what they face, and a mask of the nodes of side 1 that are not listed.
     """
     chosen = find_listed(space, nodes, points, one.name)
     rows = np.concatenate([np.flatnonzero(nodes.numbers == number) for number in chosen])
@@ -265,7 +281,7 @@ def _pick_listed(
 
 
 def side_of(space: FemSpace, facets: Facets) -> Side:
-    """Gather all nodes and facets of a boundary, on every rank, in the order of the mesh's numbers.
+    """Gather a boundary on every rank: nodes in the order of their numbers, each facet once.
 
     Collective.
     """
@@ -277,8 +293,8 @@ def side_of(space: FemSpace, facets: Facets) -> Side:
     return Side(facets.name, nodes, np.searchsorted(nodes.numbers, rows[first]))
 
 
-def _kinds(one: Side, shared: Mask, opposite: Indices, clamped: Indices) -> dict[str, Mask]:
-    """Return kind -> mask of the nodes of side 1 without a condition.
+def _sort_kinds(one: Side, shared: Mask, opposite: Indices, clamped: Indices) -> dict[str, Mask]:
+    """Return kind -> mask (m,) of the nodes of side 1 that have no condition, as a census says it.
 
     Args:
         one: side 1, of m nodes.
@@ -328,8 +344,9 @@ def _sort_held_anywhere(space: FemSpace, one: Side, clamped: Mask) -> dict[str, 
         one: side 1, of m nodes.
         clamped: (m,) nodes held in every component.
     """
-    sorted_out = sort_held(space, one.nodes, clamped)
-    moved = space.comm.max(sorted_out["prescribed"].astype(float)) > 0.0
+    # a rank knows of its own nodes only whether something moves them
+    own = sort_held(space, one.nodes, clamped)
+    moved = space.comm.max(own["prescribed"].astype(float)) > 0.0
     return {"clamped": clamped & ~moved, "prescribed": clamped & moved}
 
 
@@ -338,22 +355,24 @@ def _watch_held(
 ) -> tuple[Watched, ...]:
     """Return what watches nodes of side 1 that are held in every component. Collective.
 
-    They are given of all ranks, and in front of others that are held so too.
+    Only those in front of nodes that are held so too are watched.
 
     Args:
         space: the bodies' unknowns.
         one: side 1.
         two: side 2.
-        nodes: nodes of side 1, of all ranks.
+        nodes: the held nodes of side 1, of all ranks.
         matched: what they face.
     """
-    known = np.asarray(matched.P @ (~two.nodes.held.all(axis=1)).astype(float)) == 0.0
+    # what faces no free node of side 2
+    free_share = matched.P @ (~two.nodes.held.all(axis=1)).astype(float)
+    known = np.asarray(free_share) == 0.0
     nodes = nodes.pick(known)
     matched = matched.pick(np.flatnonzero(known))
     if not len(nodes.numbers):
         return ()
     directions = snap_to_axes(nodes.normals)
-    gap = _gap(space, one.name, two, nodes, directions, matched)
+    gap = _measure_gap(space, one.name, two, nodes, directions, matched)
     own = np.flatnonzero(space.blocks_of(nodes.numbers) >= 0)
     opposite = Facing(two.nodes, sp.csr_matrix(matched.P[own]))
     return watch_nodes(
@@ -364,9 +383,9 @@ def _watch_held(
 def _borrow(
     space: FemSpace, facets: Facets, one: Side, kinds: dict[str, Mask], having: Indices
 ) -> Borrowed | None:
-    """Return what nodes of side 1 without a pressure of their own take of neighbours.
+    """Return what nodes of side 1 without a pressure of their own take of neighbours. Collective.
 
-    Those in front of nothing are left out.
+    Nodes in front of nothing take none: there the pressure is zero.
 
     Args:
         space: the bodies' unknowns.
@@ -375,14 +394,15 @@ def _borrow(
         kinds: what became of its nodes.
         having: numbers of this rank's nodes with a pressure.
     """
-    nothing = [
-        mask for kind, mask in kinds.items() if kind not in ("in front of nothing", "not listed")
-    ]
-    return borrow(space, facets, one.nodes.numbers[np.any(nothing, axis=0)], having)
+    without = np.any(
+        [mask for kind, mask in kinds.items() if kind not in ("in front of nothing", "not listed")],
+        axis=0,
+    )
+    return borrow(space, facets, one.nodes.numbers[without], having)
 
 
-def _hinges(space: FemSpace, one: Side, two: Side, shared: Mask, *, allowed: bool) -> Mask:
-    """Return which nodes of side 1 only glue bodies together. Collective.
+def _mark_hinges(space: FemSpace, one: Side, two: Side, shared: Mask, *, allowed: bool) -> Mask:
+    """Return a mask (m,) of the nodes of side 1 that only glue bodies together. Collective.
 
     Args:
         space: the bodies' unknowns.
@@ -396,36 +416,37 @@ def _hinges(space: FemSpace, one: Side, two: Side, shared: Mask, *, allowed: boo
     """
     numbers = np.union1d(one.nodes.numbers, two.nodes.numbers)
     clamped = [side.nodes.numbers[side.nodes.held.all(axis=1)] for side in (one, two)]
-    found = hinge_numbers(space, np.setdiff1d(numbers, np.concatenate(clamped)))
-    here = np.isin(one.nodes.numbers, found)
+    hinges = find_hinges(space, np.setdiff1d(numbers, np.concatenate(clamped)))
+    here = np.isin(one.nodes.numbers, hinges)
     if not allowed:
         refuse_hinges("contact_pair", (one.name, two.name), one.nodes.points[here & shared])
         for side in (one, two):
-            refuse_hinges(
-                "contact_pair", (side.name,), side.nodes.points[np.isin(side.nodes.numbers, found)]
-            )
+            there = np.isin(side.nodes.numbers, hinges)
+            refuse_hinges("contact_pair", (side.name,), side.nodes.points[there])
     return np.asarray(here)
 
 
 def _find_tied_over(space: FemSpace, one: Side, two: Side) -> Indices:
-    """Return the places (m,) on side 2 of the nodes to which those of side 1 are tied.
+    """Find the nodes of side 2 to which those of side 1 are tied in all components.
 
-    They are tied in all components; of several, as where ties meet, the nearest; -1 for others.
-    They cannot part, as the two sides of a weld.
+    Such nodes cannot part, as the two sides of a weld.
 
     Args:
         space: the bodies' unknowns.
         one: side 1, of m nodes.
         two: side 2.
+
+    Returns:
+        (m,) places on side 2; of several, as where ties meet, the nearest one; -1 for none.
     """
     places = np.full(len(one.nodes.numbers), -1)
     if not len(space.tied_nodes):
         return places
+    # nodes that follow one leader move as one
     own = space.leaders(one.nodes.numbers)
     others = space.leaders(two.nodes.numbers)
-    for row in np.flatnonzero(
-        np.isin(one.nodes.numbers, space.tied_nodes) & (own >= 0) & np.isin(own, others)
-    ):
+    tied = np.isin(one.nodes.numbers, space.tied_nodes) & (own >= 0) & np.isin(own, others)
+    for row in np.flatnonzero(tied):
         alike = np.flatnonzero(others == own[row])
         apart = np.linalg.norm(two.nodes.points[alike] - one.nodes.points[row], axis=1)
         places[row] = alike[np.argmin(apart)]
@@ -443,10 +464,10 @@ def _refuse_common(one: Side, two: Side) -> None:
         )
 
 
-def _faces(space: FemSpace, facets1: Facets, one: Side, angle: float) -> list[tuple[Side, Array]]:
-    """Return the smooth faces of side 1, and the normals of their nodes over the whole side.
-
-    Collective.
+def _divide_faces(
+    space: FemSpace, facets1: Facets, one: Side, angle: float
+) -> list[tuple[Side, Array]]:
+    """Divide side 1 into its smooth faces, each a side by itself. Collective.
 
     Args:
         space: the bodies' unknowns.
@@ -455,7 +476,8 @@ def _faces(space: FemSpace, facets1: Facets, one: Side, angle: float) -> list[tu
         angle: that up to which facets round a node are one face [rad].
 
     Returns:
-        pairs of a side, with normals and weights of its own, and normals (n, d).
+        pairs of a face, with normals and weights of its own, and the normals (n, d) that its nodes
+        have over the whole of side 1.
 
     Raises:
         InputError: a face that meets itself.
@@ -467,6 +489,8 @@ def _faces(space: FemSpace, facets1: Facets, one: Side, angle: float) -> list[tu
     nodes, facet = split_at_corners(space, around, one.nodes, angle)
     if len(nodes.numbers) == len(one.nodes.numbers):
         return [(one, one.nodes.normals)]
+
+    # each face has the nodes of its facets; of a node with several rows it has the one of the face
     face_of = around.faces(angle)
     faces = []
     for face in range(int(face_of.max()) + 1):
@@ -489,40 +513,46 @@ def _faces(space: FemSpace, facets1: Facets, one: Side, angle: float) -> list[tu
     return faces
 
 
-def _by_face(
+def _match_faces(
     faces: Sequence[tuple[Side, Array]], two: Side, matching: Matching, size: float
 ) -> tuple[Nodes, Matched]:
-    """Return nodes with the normals and weights of their faces, and what they face.
+    """Match all faces of side 1, and put what they face together.
 
-    They are ordered by number; ``carried`` are numbers of nodes then. Faces in front of nothing are
-    left out where the matching leaves out parts of sides, unless all are.
+    Faces in front of nothing are left out where the matching leaves out parts of sides
+    (``partial``), unless all are.
 
     Args:
         faces: those of side 1, and the normals of their nodes over the whole side.
         two: side 2.
         matching: how nodes find what they face.
         size: that of the mesh [m].
+
+    Returns:
+        the m matched nodes with the normals and weights of their faces, ordered by number, and what
+        they face, ``carried`` being numbers of nodes here.
     """
     refusal = None
-    found: list[tuple[Nodes, Matched]] = []
+    parts: list[Nodes] = []
+    matches: list[Matched] = []
     for side, mean in faces:
         try:
-            matched = _match(side, mean, two, matching, size)
+            matched = _match_face(side, mean, two, matching, size)
         except InputError as error:
             if not getattr(matching, "partial", False):
                 raise
             refusal = refusal or error
         else:
+            parts.append(side.nodes.pick(matched.rows))
             carried = side.nodes.numbers[matched.carried]
-            found.append((side.nodes.pick(matched.rows), replace(matched, carried=carried)))
-    if refusal is not None and not found:
+            matches.append(replace(matched, carried=carried))
+    if refusal is not None and not matches:
         raise refusal
+
     # all faces together; a node of several of them has several rows, side by side
-    nodes = join_nodes([nodes for nodes, _ in found])
+    nodes = join_nodes(parts)
     order = np.arange(len(nodes.numbers))
-    if len(found) > 1:
+    if len(parts) > 1:
         order = np.argsort(nodes.numbers, kind="stable")
-    matches = [matched for _, matched in found]
     weights = np.concatenate([matched.weights for matched in matches])
     whole = Matched(
         rows=np.arange(len(order)),
@@ -535,12 +565,12 @@ def _by_face(
     return replace(nodes, weights=weights).pick(order), whole.pick(order)
 
 
-def _match(side: Side, mean: Array, two: Side, matching: Matching, size: float) -> Matched:
-    """Return what a face of side 1 faces.
+def _match_face(side: Side, mean: Array, two: Side, matching: Matching, size: float) -> Matched:
+    """Return what a face of side 1 faces: along its own normals, else along mean ones.
 
-    It is sought along its own normals or, since across a gap the partner of a corner lies on the
-    bisector, along the ``mean`` normals of its nodes. This is not so where a matching leaves out
-    what faces nothing: sides of a block would see the ground beside its base.
+    Across a gap the partner of a corner lies on the bisector of its faces, along the mean of their
+    normals. A matching that leaves out what faces nothing looks along the own normals only: sides
+    of a block would see the ground beside its base.
 
     Args:
         side: a face of side 1.
@@ -562,7 +592,7 @@ def _match(side: Side, mean: Array, two: Side, matching: Matching, size: float) 
 
 
 def _find_unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched: Matched) -> Mask:
-    """Return which of the matched nodes are not clamped.
+    """Return a mask (m,) of the matched nodes that are not clamped.
 
     Args:
         space: the bodies' unknowns.
@@ -592,10 +622,10 @@ def _find_unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched
     return np.asarray(~clamped)
 
 
-def _gap(
+def _measure_gap(
     space: FemSpace, name: str, two: Side, nodes: Nodes, directions: Array, matched: Matched
 ) -> Array:
-    """Return initial gaps n·(P x_2 - x_1) >= 0 [m].
+    """Return initial gaps n·(P x_2 - x_1) >= 0 (m,) [m].
 
     Overlaps of round-off (1e-12 of the mesh's size) or of polygons count as 0.
 
