@@ -1,8 +1,9 @@
-"""Find the nodes of side 2 that a contact node of side 1 faces.
+"""Find the nodes of side 2 that a contact node of side 1 faces, node by node.
 
-The displacement u_2 at the point opposite node s is sum_j P_sj u_j.
-
-The rows of P sum to one, so that a common translation of both bodies opens and closes nothing.
+The displacement u_2 at the point opposite node s is sum_j P_sj u_j. The rows of P sum to one, so
+that a common translation of both bodies opens and closes nothing. What every matching takes and
+returns (``Side``, ``Matched``, ``Matching``) stands here, beside ``NodeToNode``; ``mortar`` has the
+other one.
 """
 
 from dataclasses import dataclass, field
@@ -17,7 +18,7 @@ from ...core.checks import at
 from ...core.errors import InputError
 from ...core.quantities import Positive
 from .nodes import Nodes
-from .partners import Surface, one_of
+from .partners import Surface, choose_partner
 
 NEARBY = 8  # nodes of side 2 that are looked at first
 # cosine of the angle between a normal and what it is seen from: under less no side faces another
@@ -47,10 +48,10 @@ class Side:
 
 
 def common_nodes(one: Side, two: Side) -> Indices:
-    """Return the places (m,) on side 2 of the nodes of side 1 that are nodes of both.
+    """Return the places (m,) on side 2 of the nodes of side 1 that are nodes of both, -1 of others.
 
-    They are so at a tip or a weld, or tied to one of side 2, which is the same; -1 stands for
-    others.
+    A node is one of both at a tip or a weld, or where it is tied to one of side 2, which is the
+    same.
     """
     places = np.full(len(one.nodes.numbers), -1) if one.tied is None else one.tied.copy()
     _, own, others = np.intersect1d(one.nodes.numbers, two.nodes.numbers, return_indices=True)
@@ -112,15 +113,19 @@ class Matching(Protocol):
 
 @dataclass(frozen=True)
 class NodeToNode:
-    """Match conforming sides.
+    """Match conforming sides: each node of side 1 has one of side 2 opposite, along its normal.
 
-    Every node of side 1 has one node of side 2 at its place, or opposite along its normal.
+    Of several nodes at one place, of bodies that meet there, the partner is the one whose facets
+    lie in front of all facets of the node.
 
-    ``tolerance``: how far beside the normal the partner may lie, as a share of the distance to the
-    next node of side 1. Of several nodes at one place, of bodies that meet there, the partner is
-    the one whose facets lie in front of all facets of the node. InputError where there is none, as
-    for a stone on two stones, for nodes without a partner, two nodes with the same one, and sides
-    that do not face each other.
+    Args:
+        tolerance: how far beside the normal the partner may lie, as a share of the distance to the
+            next node of side 1.
+
+    Raises:
+        InputError: from ``match``, nodes without a partner, several nodes that are none by
+            themselves, as two stones under a third one, two nodes with the same partner, and sides
+            that do not face each other.
     """
 
     tolerance: Annotated[float, Positive] = BESIDE
@@ -136,7 +141,7 @@ class NodeToNode:
             two: side 2.
             size: that of the mesh [m].
         """
-        partner = self._partners(one, two, size)
+        partner = self._find_partners(one, two, size)
         missing = np.flatnonzero(partner < 0)
         if len(missing):
             raise InputError(
@@ -144,18 +149,18 @@ class NodeToNode:
                 f"'{two.name}' opposite, the first at {at(one.nodes.points[missing[0]])}: mesh "
                 "both sides alike, make the smaller side the first, or use matching=DualMortar()"
             )
-        first, counts = np.unique(partner, return_counts=True)
+        partners, counts = np.unique(partner, return_counts=True)
         if counts.max() > 1:
             raise InputError(
                 f"several nodes of '{one.name}' face the node of '{two.name}' at "
-                f"{at(two.nodes.points[first[counts.argmax()]])}: mesh both sides alike, or use "
+                f"{at(two.nodes.points[partners[counts.argmax()]])}: mesh both sides alike, or use "
                 "matching=DualMortar()"
             )
         m = len(partner)
         P = sp.csr_matrix((np.ones(m), (np.arange(m), partner)), shape=(m, len(two.nodes.points)))
         return Matched(np.arange(m), P, one.nodes.weights, np.zeros(m))
 
-    def _partners(self, one: Side, two: Side, size: float) -> Indices:
+    def _find_partners(self, one: Side, two: Side, size: float) -> Indices:
         """Return the place of the nearest node opposite among those of side 2, -1 for none.
 
         Args:
@@ -165,23 +170,25 @@ class NodeToNode:
         """
         x = one.nodes.points
         count = len(two.nodes.points)
-        spacing = _spacing(one.nodes.points, size)
+        spacing = _measure_spacing(one.nodes.points, size)
         reach = self.tolerance * spacing
         together = 2.0 * min(self.tolerance, BESIDE) * spacing
         from scipy.spatial import cKDTree  # late: it takes a while
 
         # the nearest nodes first
         away, nearby = cKDTree(two.nodes.points).query(x, k=np.arange(1, min(NEARBY, count) + 1))
-        partner, along, turned, crowds = _opposite(
+        partner, along, turned, crowds = _find_opposite(
             one.nodes, two.nodes, np.sort(nearby, axis=1), reach
         )
         # what is as near along the normal, or nearer, lies in a ball of this size: unless all of it
         # was looked at, all nodes are
         unsure = np.flatnonzero((1.0 + 1e-9) * np.hypot(along + reach, reach) >= away[:, -1])
         whole = np.arange(count)[None, :]
-        groups = -(-len(unsure) * count // DISTANCES)
-        for rows in np.array_split(unsure, groups) if len(unsure) else ():
-            partner[rows], _, turned[rows], more = _opposite(
+        groups = max(-(-len(unsure) * count // DISTANCES), 1)
+        for rows in np.array_split(unsure, groups):
+            if not len(rows):
+                continue
+            partner[rows], _, turned[rows], more = _find_opposite(
                 one.nodes.pick(rows), two.nodes, whole, reach[rows]
             )
             crowds |= {int(rows[row]): crowd for row, crowd in more.items()}
@@ -191,7 +198,7 @@ class NodeToNode:
         for row, (these, apart) in sorted(crowds.items()):
             offset = two.nodes.points[these] - two.nodes.points[these[0]]
             alike = np.linalg.norm(offset, axis=1) <= together[row]
-            chosen = one_of(
+            chosen = choose_partner(
                 surface1,
                 row,
                 one.nodes.normals[row],
@@ -213,20 +220,21 @@ class NodeToNode:
 Crowds = dict[int, tuple[Indices, Array]]
 
 
-def _opposite(
+def _find_opposite(
     one: Nodes, two: Nodes, places: Indices, reach: Array
 ) -> tuple[Indices, Array, Mask, Crowds]:
-    """Find what each node of side 1 faces among these ``places`` (m, k) on side 2.
-
-    Returns (the first of the nearest nodes opposite each one, -1 for none; how far along the
-    normal, infinite for none; whether all that are there face away; where several are about as
-    near).
+    """Find what each node of side 1 faces among some places on side 2.
 
     Args:
         one: m nodes of side 1.
         two: nodes of side 2.
-        places: (m, k) which of these are looked at.
+        places: (m, k) which of these are looked at; (1, k) for the same ones at all nodes.
         reach: (m,) how far beside the normal a partner may lie [m].
+
+    Returns:
+        (m,) the nearest node opposite each one, -1 for none; (m,) how far it is along the normal
+        [m], infinite for none; (m,) whether nodes are there and all face away; and by row those
+        nodes that have several about as near in front of them.
     """
     # how far along its normal, and how far beside it, each node of side 2 is
     offset = two.points[places] - one.points[:, None, :]
@@ -294,16 +302,16 @@ def refuse_same_way(one: str, two: str, point: Array) -> None:
     )
 
 
-def _spacing(points: Array, size: float) -> Array:
-    """Return the distance [m] of each node to the next one of the same side.
+def _measure_spacing(points: Array, size: float) -> Array:
+    """Return the distances (m,) [m] of nodes to the next node of their side that is elsewhere.
 
-    That one is not at its place; for a single node it is the size of the mesh.
+    For a single node it is the size of the mesh.
     """
     if len(points) == 1:
         return np.array([size])
     from scipy.spatial import cKDTree
 
-    apart = cKDTree(points).query(points, k=min(NEARBY, len(points)))[0]
+    apart, _ = cKDTree(points).query(points, k=min(NEARBY, len(points)))
     elsewhere = apart > 1e-9 * size
     next_one = np.take_along_axis(apart, elsewhere.argmax(axis=1)[:, None], axis=1)[:, 0]
     return np.asarray(np.where(elsewhere.any(axis=1), next_one, size))

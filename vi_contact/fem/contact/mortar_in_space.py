@@ -1,6 +1,4 @@
-"""Integrate the dual mortar coupling of sides in space.
-
-They are of triangles or quadrilaterals, in any mixture of both sides.
+"""Integrate the dual mortar coupling of sides in space, of triangles and quadrilaterals.
 
 A node of side 1 looks along its own normal, so that what it faces lies on that normal and normal
 forces have no moment. Along it, its facets and those of side 2 are seen as polygons of a plane
@@ -12,6 +10,10 @@ with b = phi if that is all of it (biorthogonal functions, of distorted quadrila
 (1, x, y) if it is a part: bilinear functions, carried on from a strip of a facet to its far nodes,
 grow without bound as the strip thins. Both keep sum_s psi_s = 1, ∫ psi_s = D_s > 0 and ∫ psi_s x =
 D_s x_s, and are the same on triangles.
+
+The steps of ``in_space``: looks and pieces some at a time (``_Block``), the integrals of each
+block, what all of them cover (``covering``), and D and M from the blocks. Letters in shapes: v
+nodes of a facet of side 1, w of side 2, m and n nodes of the sides.
 """
 
 from collections.abc import Iterator, Sequence
@@ -34,7 +36,7 @@ MOST_POINTS = 20  # of Gauss a way
 POINTS = 2**18  # at which functions are held at once, a few for each triangle of a piece
 
 
-def integrals(looks: Looks, pieces: Pieces) -> tuple[Array, Array]:
+def integrate(looks: Looks, pieces: Pieces) -> tuple[Array, Array]:
     """Integrate products of shape functions over what looks share with facets of side 2.
 
     Args:
@@ -112,8 +114,8 @@ def sum_rows(place: Indices, values: Array, count: int) -> Array:
     return np.asarray(ones @ values.reshape(len(place), int(np.prod(values.shape[1:]))))
 
 
-def dual(looks: Looks, own: Array, whole: Mask) -> Array:
-    """Return A (looks, v, v) of the functions psi = A phi of looks.
+def make_dual(looks: Looks, own: Array, whole: Mask) -> Array:
+    """Return A (looks, v, v) of the dual functions psi = A phi of looks.
 
     Args:
         looks: those of side 1.
@@ -128,14 +130,17 @@ def dual(looks: Looks, own: Array, whole: Mask) -> Array:
 
 
 def linear_functions(looks: Looks, own: Array) -> tuple[Array, Array, Array]:
-    """Return b at the nodes of looks (looks, v, 3), (∫ b bᵀ)⁻¹ (looks, 3, 3), and the middles.
+    """Return what is to be known of b = (1, x, y) on looks.
 
-    There b = (1, 0, 0): the middles (looks, 1, 2) of what is in front of side 2. Lengths are over
-    the reach of the facet.
+    x and y are measured from the middle of what is in front of side 2, over the reach of the facet,
+    so that the entries of ∫ b bᵀ are of one size.
 
     Args:
         looks: those of side 1.
         own: (looks, v, v) ∫ phi phiᵀ over their parts in front of side 2.
+
+    Returns:
+        b at the nodes (looks, v, 3), (∫ b bᵀ)⁻¹ (looks, 3, 3), and these middles (looks, 1, 2) [m].
     """
     D = own.sum(axis=2)
     middle = np.einsum("kv,kvc->kc", D, looks.polygons) / D.sum(axis=1)[:, None]
@@ -144,8 +149,8 @@ def linear_functions(looks: Looks, own: Array) -> tuple[Array, Array, Array]:
     return linear, np.linalg.inv(linear.swapaxes(1, 2) @ own @ linear), middle[:, None, :]
 
 
-def entries(values: Array, rows: Indices, columns: Indices, m: int, n: int) -> sp.coo_matrix:
-    """Return values summed at their rows and columns.
+def sum_entries(values: Array, rows: Indices, columns: Indices, m: int, n: int) -> sp.coo_matrix:
+    """Return the matrix (m, n) of values, summed where several have one row and column.
 
     Args:
         values: (k, v, w).
@@ -193,7 +198,8 @@ class _Block:
         looks: those of side 1.
         pieces: what they share with side 2.
         covered: (looks,) share of each that is covered.
-        own, mixed: ``integrals`` of the functions of side 1, and of both sides.
+        own: (looks, v, v) ∫ phi phiᵀ of the functions of side 1 [m²].
+        mixed: (pieces, v, w) ∫ phi_i phi_j of those of both sides [m²].
     """
 
     looks: Looks
@@ -225,7 +231,7 @@ class _Block:
 
 
 def in_space(one: Side, two: Side) -> Coupled:
-    """Integrate the coupling of sides of solid bodies."""
+    """Couple sides of solid bodies: what do looks see, what do they cover, then D and M."""
     ours = facets_of(one, 1)
     theirs = facets_of(two, -1)
     from scipy.spatial import cKDTree  # late: it takes a while
@@ -240,18 +246,19 @@ def in_space(one: Side, two: Side) -> Coupled:
         some = looks.pick(rows)
         pieces, covered = opposite(some, theirs, tree)
         pieces = pieces.pick(np.flatnonzero((covered > ROUND_OFF)[pieces.look]))
+        # number the looks anew that have pieces
         kept, look = np.unique(pieces.look, return_inverse=True)
         if not len(kept):
             continue
         some = some.pick(kept)
         pieces = replace(pieces, look=look.ravel())
-        blocks.append(_Block(some, pieces, covered[kept], *integrals(some, pieces)))
+        blocks.append(_Block(some, pieces, covered[kept], *integrate(some, pieces)))
     covered_parts = _measure_cover(ours, blocks, common_nodes(one, two) >= 0)
     return couple(covered_parts, lambda carried: _assemble(one, two, theirs, blocks, carried))
 
 
 def _measure_cover(ours: Facets, blocks: Sequence[_Block], common: Mask) -> Covered:
-    """Return what is covered of the looks of these blocks, of each for the nodes that ask.
+    """Measure what is covered of the looks of these blocks, of each for the nodes that ask.
 
     Args:
         ours: the facets of side 1.
@@ -307,8 +314,8 @@ def _assemble(
     partner = common_nodes(one, two)
     D = np.zeros(m)
     overlap = np.zeros(m)
-    parts = [sp.coo_matrix((m, n))]
-    start = 0
+    parts = [sp.coo_matrix((m, n))]  # of M
+    start = 0  # of the rows of ``carried`` that are those of a block
     points = one.nodes.points
     H = curvatures(theirs.corners, theirs.nodes, theirs.normals)
     curved = bool(np.any(np.linalg.norm(H, axis=(1, 2)) * theirs.reach > PLANE))
@@ -324,16 +331,17 @@ def _assemble(
         borne = carried.nodes[some.nodes] & some.asking
         asking = (some.asking & used & ~borne)[:, :, None]
         common = partner[some.nodes]
-        functions = dual(some, own, (block.covered >= 1.0 - WHOLE) & ~borne.any(axis=1))
+        functions = make_dual(some, own, (block.covered >= 1.0 - WHOLE) & ~borne.any(axis=1))
         functions, own_D, forces = hand_over(functions, own.sum(axis=2), common >= 0)
         # their share in M and D, and what they pass to nodes of both sides
         values = (functions * asking)[pieces.look] @ block.mixed
-        parts.append(entries(values, some.nodes[pieces.look], theirs.nodes[pieces.facet], m, n))
+        parts.append(sum_entries(values, some.nodes[pieces.look], theirs.nodes[pieces.facet], m, n))
         if (common >= 0).any():
-            parts.append(entries(-forces * asking, some.nodes, common, m, n))
+            parts.append(sum_entries(-forces * asking, some.nodes, common, m, n))
         np.add.at(D, some.nodes, own_D * asking[:, :, 0])
+        # what facets of one curved face may overlap, also where functions are carried on
         if curved:
-            piece = _overlap(points[some.nodes], theirs, H, block)[:, None]
+            piece = _find_overlap(points[some.nodes], theirs, H, block)[:, None]
             np.maximum.at(overlap, some.nodes[pieces.look], piece * some.asking[pieces.look])
             np.maximum.at(
                 overlap, by[pieces.look], FARTHER * piece * borne.any(axis=1)[pieces.look, None]
@@ -346,7 +354,7 @@ def _assemble(
     return D, sp.csr_matrix((values, (rows_of_values, columns)), shape=(m, n)), overlap
 
 
-def _overlap(corners: Array, theirs: Facets, H: Array, block: _Block) -> Array:
+def _find_overlap(corners: Array, theirs: Facets, H: Array, block: _Block) -> Array:
     """Return by how much the pieces (k,) of looks may overlap facets of one curved face [m].
 
     It is the most at the corners and in the middle of each.
@@ -401,4 +409,4 @@ def _carry(
     among = np.flatnonzero(place[pieces.look] >= 0)
     look = place[pieces.look[among]]
     values = functions[look] @ block.mixed[among]
-    return entries(values, by[rows][look], theirs.nodes[pieces.facet[among]], len(points), n)
+    return sum_entries(values, by[rows][look], theirs.nodes[pieces.facet[among]], len(points), n)

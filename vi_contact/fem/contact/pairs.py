@@ -10,8 +10,8 @@ friction acts on ǔ_t, and the work of a reaction on ǔ is that of the pair of f
 -P_sjᵀ r on side 2: action is reaction. n is the outward normal of side 1, from side 1 to side 2.
 Displacements are small: nobody's partner changes.
 
-Both sides are gathered on every rank, which all do the same work up to the gaps; then each keeps the
-conditions of its own nodes. Sides are ``Side`` (``matching``), what nodes of side 1 face is
+Both sides are gathered on every rank, which all do the same work up to the gaps; then each keeps
+the conditions of its own nodes. Sides are ``Side`` (``matching``), what nodes of side 1 face is
 ``Matched``; ``_match_faces`` matches the faces of side 1 one by one.
 """
 
@@ -106,37 +106,14 @@ def contact_pair(
     one, two, shared = _two_sides(space, facets1, facets2)
     hinge = _mark_hinges(space, one, two, shared, allowed=hinges)
     one = replace(one, tied=_find_tied_over(space, one, two))
-    tied = one.nodes.numbers[np.asarray(one.tied) >= 0]
     faces = _divide_faces(space, facets1, one, angle)
     with together(space.comm):  # a matching of the user's may fail on one rank
         nodes, matched = _match_faces(faces, two, matching, space.size)
-    opposite = np.concatenate([nodes.numbers, matched.carried])
-    carried = np.setdiff1d(matched.carried, nodes.numbers)
 
-    # which nodes have a condition, and what became of the others: those of both sides, tied over,
-    # clamped or prescribed, hardly covered, not listed
-    can_part = ~np.isin(nodes.numbers, np.union1d(two.nodes.numbers, tied))
-    nodes = nodes.pick(can_part)
-    matched = matched.pick(can_part)
-    free = _find_unclamped(space, one.name, nodes, two, matched)
-    kinds = _sort_kinds(one, shared, opposite, nodes.numbers[~free])
-    kinds |= _sort_held_anywhere(space, one, kinds["clamped"])
-    watched = (
-        _watch_held(space, one, two, nodes.pick(~free), matched.pick(~free))
-        if points is None
-        else ()
+    # which nodes have a condition, and what became of the others
+    nodes, matched, kinds, watched = _sort_nodes(
+        space, one, two, nodes, matched, shared=shared, hinge=hinge, watch=points is None
     )
-    kinds["partly covered"] = np.isin(one.nodes.numbers, carried)
-    little = nodes.numbers[free & (matched.shares < LEAST_SHARE)]
-    kinds["hardly covered"] = np.isin(one.nodes.numbers, little)
-    _warn_of_coarse(space, one, two, little)
-    kinds |= {
-        "shared with another body": hinge & ~shared,
-        "tied to the other side": np.isin(one.nodes.numbers, tied),
-    }
-    kinds["in front of nothing"] &= ~kinds["tied to the other side"]
-    nodes = nodes.pick(free)
-    matched = matched.pick(free)
     if points is not None:
         nodes, matched, kinds["not listed"] = _pick_listed(space, one, nodes, matched, points)
 
@@ -150,7 +127,7 @@ def contact_pair(
         gap = shares @ gap
         P = sp.csr_matrix(shares @ P)
         kinds["tied to another"] = np.isin(one.nodes.numbers, np.setdiff1d(alone, nodes.numbers))
-    uncovered = np.isin(nodes.numbers, little)
+    uncovered = np.isin(nodes.numbers, one.nodes.numbers[kinds["hardly covered"]])
     some_uncovered = bool(uncovered.any())
     census = census_of_all(one.name, one.nodes, kinds, len(nodes.numbers))
     tell(space.comm, census)
@@ -291,6 +268,62 @@ def side_of(space: FemSpace, facets: Facets) -> Side:
     )
     _, first = np.unique(np.sort(rows, axis=1), axis=0, return_index=True)
     return Side(facets.name, nodes, np.searchsorted(nodes.numbers, rows[first]))
+
+
+def _sort_nodes(
+    space: FemSpace,
+    one: Side,
+    two: Side,
+    nodes: Nodes,
+    matched: Matched,
+    *,
+    shared: Mask,
+    hinge: Mask,
+    watch: bool,
+) -> tuple[Nodes, Matched, dict[str, Mask], tuple[Watched, ...]]:
+    """Sort the matched nodes into those with a condition and others. Collective.
+
+    Args:
+        space: the bodies' unknowns.
+        one: side 1, of m nodes.
+        two: side 2.
+        nodes: the matched nodes of side 1, a row for each face.
+        matched: what they face.
+        shared: (m,) nodes of both sides.
+        hinge: (m,) nodes that only glue bodies together.
+        watch: whether nodes that are prescribed in every component are watched.
+
+    Returns:
+        the nodes with a condition, what they face, kind -> mask (m,) of all others and of those
+        with hardly anything in front of them, and what watches prescribed ones.
+    """
+    # nodes of both sides, and nodes tied over, cannot part
+    tied = one.nodes.numbers[np.asarray(one.tied) >= 0]
+    opposite = np.concatenate([nodes.numbers, matched.carried])
+    carried = np.setdiff1d(matched.carried, nodes.numbers)
+    can_part = ~np.isin(nodes.numbers, np.union1d(two.nodes.numbers, tied))
+    nodes = nodes.pick(can_part)
+    matched = matched.pick(can_part)
+
+    # nodes that are held in every component have no condition
+    free = _find_unclamped(space, one.name, nodes, two, matched)
+    kinds = _sort_kinds(one, shared, opposite, nodes.numbers[~free])
+    kinds |= _sort_held_anywhere(space, one, kinds["clamped"])
+    watched: tuple[Watched, ...] = ()
+    if watch:
+        watched = _watch_held(space, one, two, nodes.pick(~free), matched.pick(~free))
+
+    # what lies in front of the others: others carry nodes with little, if there are any
+    kinds["partly covered"] = np.isin(one.nodes.numbers, carried)
+    little = nodes.numbers[free & (matched.shares < LEAST_SHARE)]
+    kinds["hardly covered"] = np.isin(one.nodes.numbers, little)
+    _warn_of_coarse(space, one, two, little)
+    kinds |= {
+        "shared with another body": hinge & ~shared,
+        "tied to the other side": np.isin(one.nodes.numbers, tied),
+    }
+    kinds["in front of nothing"] &= ~kinds["tied to the other side"]
+    return nodes.pick(free), matched.pick(free), kinds, watched
 
 
 def _sort_kinds(one: Side, shared: Mask, opposite: Indices, clamped: Indices) -> dict[str, Mask]:

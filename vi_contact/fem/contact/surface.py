@@ -270,8 +270,9 @@ def _make_question(
 ) -> Callable[[Array, Array], tuple[Array, Array]]:
     """Return a function that asks an obstacle: points, normals (k, d) -> directions, gaps (k,) [m].
 
-    It is called with the points of a rank or with all points of a boundary. Only where it has all of
-    them, which their number tells, the far side of a round body can be let be (``locate_obstacle``).
+    It is called with the points of a rank or with all points of a boundary. Only where it has all
+    of them, which their number tells, the far side of a round body can be let be
+    (``locate_obstacle``).
 
     Args:
         obstacle: what the boundary faces; Touching() when None.
