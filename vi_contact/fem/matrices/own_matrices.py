@@ -255,16 +255,18 @@ def _read_vectors(owner: str, n: int, arguments: Mapping[str, Any]) -> tuple[Loa
     Raises:
         InputError: vectors that do not fit the rows.
     """
-
-    def read(name: str, value: Any, unit: str) -> Array:
-        return np.zeros(n) if value is None else array(owner, name, value, (n,), unit=unit)
-
     load = arguments["load"]
     if not isinstance(load, Load):
-        load = Load(read("load", load, "N"))
+        load = Load(_read_vector(owner, "load", load, n, "N"))
     for vector in (load.constant, *(part for part, _ in load.separable)):
-        read("a vector of load", vector, "N")
-    return load, read("u0", arguments["u0"], "m"), read("v0", arguments["v0"], "m/s")
+        _read_vector(owner, "a vector of load", vector, n, "N")
+    u0 = _read_vector(owner, "u0", arguments["u0"], n, "m")
+    return load, u0, _read_vector(owner, "v0", arguments["v0"], n, "m/s")
+
+
+def _read_vector(owner: str, name: str, value: Any, n: int, unit: str) -> Array:
+    """Return n numbers, zeros for None; ``owner``, ``name`` and ``unit`` are for messages."""
+    return np.zeros(n) if value is None else array(owner, name, value, (n,), unit=unit)
 
 
 class MatrixSpace(NodalSpace):

@@ -98,7 +98,9 @@ def _draw_box(space: FemSpace, cells: Indices) -> dict[str, Any]:
     points = mesh.geometry.x[compat.geometry_dofmap(mesh)[cells]].reshape(-1, 3)
     low = -space.comm.max(np.max(-points, axis=0, initial=-np.inf))
     high = space.comm.max(np.max(points, axis=0, initial=-np.inf))
-    corners = [[(high if i >> c & 1 else low)[c] for c in range(d)] for i in range(2**d)]
+    corners = []
+    for i in range(2**d):
+        corners.append([(high if i >> c & 1 else low)[c] for c in range(d)])
     lines = []
     for i in range(2**d):
         for c in range(d):
