@@ -124,10 +124,10 @@ def _list_groups(given: dict[str, tuple[Any, ...]]) -> list[tuple[str, Any]]:
 def _refuse_repeated(**lists: Sequence[Any]) -> None:
     """Raise InputError for an object that a list names twice: it would act twice."""
     for name, items in lists.items():
-        for one, other in combinations(items, 2):
-            if one is other:
+        for first, second in combinations(items, 2):
+            if first is second:
                 raise InputError(
-                    f"assemble: {name} names one {type(one).__name__} twice, which would act "
+                    f"assemble: {name} names one {type(first).__name__} twice, which would act "
                     "twice; leave it out once, or give one of twice the size"
                 )
 
@@ -162,10 +162,11 @@ def _find_contradictions(
         tied: boundaries that move together.
         damped: absorbing boundaries.
     """
-    for one, two in combinations(held, 2):
-        if not one.same_motion(two) and len(np.intersect1d(one.facets.indices, two.facets.indices)):
+    for first, second in combinations(held, 2):
+        both = np.intersect1d(first.facets.indices, second.facets.indices)
+        if len(both) and not first.same_motion(second):
             yield (
-                f"assemble: boundary groups '{one.facets.name}' and '{two.facets.name}' share "
+                f"assemble: boundary groups '{first.facets.name}' and '{second.facets.name}' share "
                 "facets on which different displacements are prescribed: leave out one of the two"
             )
     sides = [side for tie in tied if tie.components is None for side in (tie.first, tie.second)]

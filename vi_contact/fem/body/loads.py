@@ -216,11 +216,11 @@ class Support:
         return self.condition.at(points, self.places, t, derivative)
 
 
-def _agree(one: Value, other: Value) -> bool:
+def _agree(value: Value, other: Value) -> bool:
     """Say whether two values are one function, or equal constants; one not given is zero."""
-    if callable(one) or callable(other):
-        return bool(one == other) or (_at_rest(one) and _at_rest(other))
-    return np.array_equal(one, other)
+    if callable(value) or callable(other):
+        return bool(value == other) or (_at_rest(value) and _at_rest(other))
+    return np.array_equal(value, other)
 
 
 def _at_rest(value: Value) -> bool:

@@ -123,9 +123,9 @@ def areas(polygons: Array) -> Array:
     return 0.5 * cross(spokes[:, :-1], spokes[:, 1:]).sum(axis=1)
 
 
-def cross(one: Array, two: Array) -> Array:
-    """Return the products one_x two_y - one_y two_x of plane vectors (..., 2)."""
-    return np.asarray(one[..., 0] * two[..., 1] - one[..., 1] * two[..., 0])
+def cross(first: Array, second: Array) -> Array:
+    """Return the products first_x second_y - first_y second_x of plane vectors (..., 2)."""
+    return np.asarray(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0])
 
 
 def turns(polygons: Array) -> Array:

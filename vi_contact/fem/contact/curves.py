@@ -63,17 +63,17 @@ def left_out(H: Array, weights: Array, corners: Array) -> Array:
     )
 
 
-def may_overlap(H: Array, one: tuple[Array, Array], two: tuple[Array, Array]) -> Array:
+def may_overlap(H: Array, facet1: tuple[Array, Array], facet2: tuple[Array, Array]) -> Array:
     """Return by how much (k,) [m] pieces of facets may overlap: the most at their points.
 
     It is ``MARGIN`` times |delta|, as the head of this module states it.
 
     Args:
         H: (k, d, d) of side 2 at each piece.
-        one: shape functions (k, p, v) at the points and corners (k, v, d) of the facets of side 1.
-        two: the same of the facets of side 2.
+        facet1: shape functions (k, p, v) at the points, and corners (k, v, d), of facets of side 1.
+        facet2: the same of the facets of side 2.
     """
-    delta = 0.5 * (left_out(H, *two) - left_out(H, *one))
+    delta = 0.5 * (left_out(H, *facet2) - left_out(H, *facet1))
     return np.asarray(MARGIN * np.abs(delta).max(axis=1, initial=0.0))
 
 

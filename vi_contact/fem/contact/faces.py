@@ -235,10 +235,11 @@ def _compute_curved_normals(space: FemSpace, facets: Any, plane: Array) -> Array
     return np.asarray(normals / np.linalg.norm(normals, axis=2)[:, :, None])
 
 
-def _angles(one: Array, other: Array) -> Array:
+def _angles(first: Array, second: Array) -> Array:
     """Return the angles (k,) between unit vectors (k, d) [rad], exact for small ones too."""
     return np.asarray(
-        2.0 * np.arctan2(np.linalg.norm(one - other, axis=1), np.linalg.norm(one + other, axis=1))
+        2.0
+        * np.arctan2(np.linalg.norm(first - second, axis=1), np.linalg.norm(first + second, axis=1))
     )
 
 

@@ -70,13 +70,13 @@ def find_hinges(space: FemSpace, numbers: Indices) -> Indices:
     # link the pairs of one cell and node
     order = np.lexsort((node, cell))
     same = (np.diff(cell[order]) == 0) & (np.diff(node[order]) == 0)
-    one = member[order[:-1][same]]
-    other = member[order[1:][same]]
+    start = member[order[:-1][same]]
+    end = member[order[1:][same]]
 
     # ranks share the pairs of facets that are ghosts of some
     ghosts = np.concatenate(from_each(space.comm, known[facets >= local.size_local]))
     of_ghosts = np.isin(things % local.size_global, ghosts)
-    part = parts_of(space.comm, one, other, things, np.flatnonzero(of_ghosts))
+    part = parts_of(space.comm, start, end, things, np.flatnonzero(of_ghosts))
 
     # nodes with several parts
     pairs = np.unique(np.column_stack([things // local.size_global, part]), axis=0)

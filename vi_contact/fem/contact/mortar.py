@@ -58,30 +58,30 @@ class DualMortar:
 
     partial: ClassVar[bool] = True  # parts of side 1 in front of nothing have no conditions
 
-    def match(self, one: Side, two: Side, size: float) -> Matched:
+    def match(self, side1: Side, side2: Side, size: float) -> Matched:
         """Return what the nodes of side 1 face by the dual mortar coupling.
 
         Args:
-            one: side 1.
-            two: side 2.
+            side1: side 1.
+            side2: side 2.
             size: that of the mesh [m]; nothing here needs it.
         """
-        d = one.nodes.points.shape[1]
+        d = side1.nodes.points.shape[1]
         if d == 1:
             raise InputError(
                 "DualMortar joins sides of plane and solid bodies: use matching=NodeToNode() for "
                 "bars"
             )
-        if max(one.facets.shape[1], two.facets.shape[1]) > (2 if d == 2 else 4):
+        if max(side1.facets.shape[1], side2.facets.shape[1]) > (2 if d == 2 else 4):
             raise InputError(
-                f"DualMortar joins facets of first order and those of '{one.name}' and "
-                f"'{two.name}' have mid-points (degree=2): mesh both sides alike for "
+                f"DualMortar joins facets of first order and those of '{side1.name}' and "
+                f"'{side2.name}' have mid-points (degree=2): mesh both sides alike for "
                 "matching=NodeToNode(), or use degree=1"
             )
-        coupling = in_space(one, two) if d == 3 else _in_plane(one, two)
+        coupling = in_space(side1, side2) if d == 3 else _in_plane(side1, side2)
         D = coupling.D
         if not (D > 0.0).any():
-            _refuse_apart(one, two)
+            _refuse_apart(side1, side2)
         # P = D⁻¹ M, at the nodes that have a function
         rows = np.flatnonzero(D > 0.0)
         P = sp.csr_matrix(sp.diags([1.0 / D[rows]], [0]) @ coupling.M[rows])
@@ -89,15 +89,15 @@ class DualMortar:
         return Matched(rows, P, D[rows], coupling.overlap[rows], coupling.share[rows], carried)
 
 
-def _refuse_apart(one: Side, two: Side) -> None:
+def _refuse_apart(side1: Side, side2: Side) -> None:
     """Raise InputError for sides of which no part lies opposite the other."""
     some, others = (
-        side.nodes.normals[:: 1 + len(side.nodes.normals) // 1000] for side in (one, two)
+        side.nodes.normals[:: 1 + len(side.nodes.normals) // 1000] for side in (side1, side2)
     )
     if np.all(some @ others.T > EDGE_ON):
-        refuse_same_way(one.name, two.name, one.nodes.points[0])
+        refuse_same_way(side1.name, side2.name, side1.nodes.points[0])
     raise InputError(
-        f"no part of '{two.name}' lies opposite '{one.name}', along the normals of the latter: "
+        f"no part of '{side2.name}' lies opposite '{side1.name}', along the normals of the latter: "
         "choose the two boundaries between the bodies"
     )
 
@@ -137,24 +137,24 @@ class _Segment:
         return np.asarray((points - self.ends[0]) @ along / (along @ along))
 
 
-def _in_plane(one: Side, two: Side) -> Coupled:
+def _in_plane(side1: Side, side2: Side) -> Coupled:
     """Couple sides of plane bodies: find pieces, see what they cover, then assemble D and M."""
-    ends1 = one.nodes.points[one.facets]
-    ends2 = two.nodes.points[two.facets]
-    normals1 = _normals(one, ends1)
-    normals2 = _normals(two, ends2)
-    H = curvatures(ends2, two.facets, normals2)
+    ends1 = side1.nodes.points[side1.facets]
+    ends2 = side2.nodes.points[side2.facets]
+    normals1 = _normals(side1, ends1)
+    normals2 = _normals(side2, ends2)
+    H = curvatures(ends2, side2.facets, normals2)
 
     segments = []
     # project side 2 onto each segment of side 1, and integrate over the pieces that this makes
-    for facet, ends, normal in zip(one.facets, ends1, normals1, strict=True):
+    for facet, ends, normal in zip(side1.facets, ends1, normals1, strict=True):
         pieces = list(_pieces(ends, normal, ends2, normals2))
         if sum(high - low for low, high, *_ in pieces) > ROUND_OFF:
             length = float(np.linalg.norm(ends[1] - ends[0]))
             overlap = _find_overlap(pieces, ends, ends2, H)
             segments.append(_Segment(facet, ends, pieces, *_integrate(pieces, length), overlap))
-    covered = _measure_cover(segments, common_nodes(one, two) >= 0)
-    return couple(covered, lambda carried: _assemble(one, two, segments, carried))
+    covered = _measure_cover(segments, common_nodes(side1, side2) >= 0)
+    return couple(covered, lambda carried: _assemble(side1, side2, segments, carried))
 
 
 def _find_overlap(
@@ -173,9 +173,9 @@ def _find_overlap(
     share = np.array([0.0, 0.5, 1.0])
     own = np.array([low + share * (high - low) for low, high, *_ in pieces])
     other = np.array([across[0] + share * (across[1] - across[0]) for *_, across in pieces])
-    one = np.stack([1.0 - own, own], axis=2), np.repeat(ends[None], len(pieces), axis=0)
-    two = np.stack([1.0 - other, other], axis=2), ends2[segment]
-    return float(may_overlap(H[segment], one, two).max())
+    facet1 = np.stack([1.0 - own, own], axis=2), np.repeat(ends[None], len(pieces), axis=0)
+    facet2 = np.stack([1.0 - other, other], axis=2), ends2[segment]
+    return float(may_overlap(H[segment], facet1, facet2).max())
 
 
 def _measure_cover(segments: list[_Segment], common: Mask) -> Covered:
@@ -210,22 +210,22 @@ def _share(segment: _Segment) -> float:
 
 
 def _assemble(
-    one: Side, two: Side, segments: list[_Segment], carried: Carried
+    side1: Side, side2: Side, segments: list[_Segment], carried: Carried
 ) -> tuple[Array, sp.csr_matrix, Array]:
     """Return D (m,), M (m, n) and by how much polygons of one curve may overlap (m,) [m].
 
     Args:
-        one: side 1, of m nodes.
-        two: side 2, of n nodes.
+        side1: side 1, of m nodes.
+        side2: side 2, of n nodes.
         segments: those of side 1 in front of side 2.
         carried: nodes that others carry.
     """
-    m = len(one.nodes.points)
-    n = len(two.nodes.points)
+    m = len(side1.nodes.points)
+    n = len(side2.nodes.points)
     D = np.zeros(m)
     M = sp.lil_matrix((m, n))
     overlap = np.zeros(m)
-    partner = common_nodes(one, two)
+    partner = common_nodes(side1, side2)
     for part, by, used in zip(segments, carried.by, carried.used, strict=True):
         if not used:
             continue
@@ -235,7 +235,7 @@ def _assemble(
         # a node that is carried has its share on the nodes of another segment
         if carried.nodes[facet].any():
             overlap[by] = np.maximum(overlap[by], FARTHER * part.overlap)
-            _carry(D, M, one.nodes.points, two.facets, part, by, carried.nodes)
+            _carry(D, M, side1.nodes.points, side2.facets, part, by, carried.nodes)
             continue
         # psi = A phi with A = diag(∫ phi) (∫ phi phiᵀ)⁻¹; nodes of both sides hand theirs over
         dual = np.diag(own.sum(axis=1)) @ np.linalg.inv(own)
@@ -246,7 +246,7 @@ def _assemble(
         # D_s = ∫ psi_s, M_sj = ∫ psi_s phi_j, and what is passed on to nodes t of both sides
         D[facet] += own_D
         for segment, values in part.mixed.items():
-            for j, column in zip(two.facets[segment], (dual @ values).T, strict=True):
+            for j, column in zip(side2.facets[segment], (dual @ values).T, strict=True):
                 for i, value in zip(facet, column, strict=True):
                     M[i, j] += value
         for j in np.flatnonzero(common >= 0):

@@ -230,14 +230,14 @@ class _Block:
         return looks.middles + np.einsum("kic,kc->ki", looks.frames, seen)
 
 
-def in_space(one: Side, two: Side) -> Coupled:
+def in_space(side1: Side, side2: Side) -> Coupled:
     """Couple sides of solid bodies: what do looks see, what do they cover, then D and M."""
-    ours = facets_of(one, 1)
-    theirs = facets_of(two, -1)
+    ours = facets_of(side1, 1)
+    theirs = facets_of(side2, -1)
     from scipy.spatial import cKDTree  # late: it takes a while
 
     tree = cKDTree(theirs.middles)
-    looks = looks_of(ours, one.nodes)
+    looks = looks_of(ours, side1.nodes)
     blocks = []
     # cut and integrate some looks at a time; those with nothing in front of them are left out
     for rows in np.array_split(np.arange(len(looks.nodes)), 1 + len(looks.nodes) // BLOCK):
@@ -253,8 +253,8 @@ def in_space(one: Side, two: Side) -> Coupled:
         some = some.pick(kept)
         pieces = replace(pieces, look=look.ravel())
         blocks.append(_Block(some, pieces, covered[kept], *integrate(some, pieces)))
-    covered_parts = _measure_cover(ours, blocks, common_nodes(one, two) >= 0)
-    return couple(covered_parts, lambda carried: _assemble(one, two, theirs, blocks, carried))
+    covered_parts = _measure_cover(ours, blocks, common_nodes(side1, side2) >= 0)
+    return couple(covered_parts, lambda carried: _assemble(side1, side2, theirs, blocks, carried))
 
 
 def _measure_cover(ours: Facets, blocks: Sequence[_Block], common: Mask) -> Covered:
@@ -298,25 +298,25 @@ def _whole_weights(looks: Looks) -> Array:
 
 
 def _assemble(
-    one: Side, two: Side, theirs: Facets, blocks: Sequence[_Block], carried: Carried
+    side1: Side, side2: Side, theirs: Facets, blocks: Sequence[_Block], carried: Carried
 ) -> tuple[Array, sp.csr_matrix, Array]:
     """Return D (m,), M (m, n) and by how much facets of one curved face may overlap (m,) [m].
 
     Args:
-        one: side 1, of m nodes.
-        two: side 2, of n nodes.
+        side1: side 1, of m nodes.
+        side2: side 2, of n nodes.
         theirs: the facets of side 2.
         blocks: the looks of side 1, some at a time.
         carried: nodes that others carry.
     """
-    m = len(one.nodes.points)
-    n = len(two.nodes.points)
-    partner = common_nodes(one, two)
+    m = len(side1.nodes.points)
+    n = len(side2.nodes.points)
+    partner = common_nodes(side1, side2)
     D = np.zeros(m)
     overlap = np.zeros(m)
     parts = [sp.coo_matrix((m, n))]  # of M
     start = 0  # of the rows of ``carried`` that are those of a block
-    points = one.nodes.points
+    points = side1.nodes.points
     H = curvatures(theirs.corners, theirs.nodes, theirs.normals)
     curved = bool(np.any(np.linalg.norm(H, axis=(1, 2)) * theirs.reach > PLANE))
     for block in blocks:
@@ -347,7 +347,7 @@ def _assemble(
                 overlap, by[pieces.look], FARTHER * piece * borne.any(axis=1)[pieces.look, None]
             )
         if borne.any():
-            parts.append(_carry(D, one.nodes.points, theirs, block, by, borne, n))
+            parts.append(_carry(D, side1.nodes.points, theirs, block, by, borne, n))
     values = np.concatenate([part.data for part in parts])
     rows_of_values = np.concatenate([part.row for part in parts])
     columns = np.concatenate([part.col for part in parts])
@@ -368,9 +368,9 @@ def _find_overlap(corners: Array, theirs: Facets, H: Array, block: _Block) -> Ar
     looks = block.looks
     pieces = block.pieces
     points = np.concatenate([pieces.polygons, pieces.polygons.mean(axis=1, keepdims=True)], axis=1)
-    one = hats(looks.polygons[pieces.look], points), corners[pieces.look]
-    two = hats(pieces.seen, points), theirs.corners[pieces.facet]
-    return may_overlap(H[pieces.facet], one, two)
+    facet1 = hats(looks.polygons[pieces.look], points), corners[pieces.look]
+    facet2 = hats(pieces.seen, points), theirs.corners[pieces.facet]
+    return may_overlap(H[pieces.facet], facet1, facet2)
 
 
 def _carry(

@@ -103,33 +103,33 @@ def contact_pair(
         matching = NodeToNode()
 
     # what faces what: nodes of both sides, and of each face of side 1 what it has in front
-    one, two, shared = _two_sides(space, facets1, facets2)
-    hinge = _mark_hinges(space, one, two, shared, allowed=hinges)
-    one = replace(one, tied=_find_tied_over(space, one, two))
-    faces = _divide_faces(space, facets1, one, angle)
+    side1, side2, shared = _two_sides(space, facets1, facets2)
+    hinge = _mark_hinges(space, side1, side2, shared, allowed=hinges)
+    side1 = replace(side1, tied=_find_tied_over(space, side1, side2))
+    faces = _divide_faces(space, facets1, side1, angle)
     with together(space.comm):  # a matching of the user's may fail on one rank
-        nodes, matched = _match_faces(faces, two, matching, space.size)
+        nodes, matched = _match_faces(faces, side2, matching, space.size)
 
     # which nodes have a condition, and what became of the others
     nodes, matched, kinds, watched = _sort_nodes(
-        space, one, two, nodes, matched, shared=shared, hinge=hinge, watch=points is None
+        space, side1, side2, nodes, matched, shared=shared, hinge=hinge, watch=points is None
     )
     if points is not None:
-        nodes, matched, kinds["not listed"] = _pick_listed(space, one, nodes, matched, points)
+        nodes, matched, kinds["not listed"] = _pick_listed(space, side1, nodes, matched, points)
 
     # gaps along the normals; nodes that are tied to one another share one condition
     alone = nodes.numbers
     directions = snap_to_axes(nodes.normals)
-    gap = _measure_gap(space, one.name, two, nodes, directions, matched)
+    gap = _measure_gap(space, side1.name, side2, nodes, directions, matched)
     P = matched.P
     if len(space.tied_nodes):
-        nodes, directions, shares = merge_tied(space, one.name, nodes, directions, angle)
+        nodes, directions, shares = merge_tied(space, side1.name, nodes, directions, angle)
         gap = shares @ gap
         P = sp.csr_matrix(shares @ P)
-        kinds["tied to another"] = np.isin(one.nodes.numbers, np.setdiff1d(alone, nodes.numbers))
-    uncovered = np.isin(nodes.numbers, one.nodes.numbers[kinds["hardly covered"]])
+        kinds["tied to another"] = np.isin(side1.nodes.numbers, np.setdiff1d(alone, nodes.numbers))
+    uncovered = np.isin(nodes.numbers, side1.nodes.numbers[kinds["hardly covered"]])
     some_uncovered = bool(uncovered.any())
-    census = census_of_all(one.name, one.nodes, kinds, len(nodes.numbers))
+    census = census_of_all(side1.name, side1.nodes, kinds, len(nodes.numbers))
     tell(space.comm, census)
 
     # from here on every rank has its own nodes of side 1
@@ -139,16 +139,16 @@ def contact_pair(
     gap = gap[slots]
     P = P[slots]
     uncovered = uncovered[slots]
-    tell_corners(space, one.name, nodes, slots, angle)
+    tell_corners(space, side1.name, nodes, slots, angle)
     own_bubbles = average_bubbles(space, facets1, nodes)
-    their_bubbles = average_bubbles(space, facets2, two.nodes, P)
+    their_bubbles = average_bubbles(space, facets2, side2.nodes, P)
     conditions = NodalConditions(
         nodes,
         directions,
         slots,
-        facing=Facing(two.nodes, P),
+        facing=Facing(side2.nodes, P),
         bubbles=own_bubbles + their_bubbles,
-        borrowed=_borrow(space, facets1, one, kinds, nodes.numbers[~uncovered]),
+        borrowed=_borrow(space, facets1, side1, kinds, nodes.numbers[~uncovered]),
     )
     surface = surface_of(
         space,
@@ -220,21 +220,21 @@ def _two_sides(space: FemSpace, facets1: Facets, facets2: Facets) -> tuple[Side,
     Raises:
         InputError: sides of the same nodes, and a facet on both sides: nothing can part there.
     """
-    one = side_of(space, facets1)
-    two = side_of(space, facets2)
-    shared = np.isin(one.nodes.numbers, two.nodes.numbers)
+    side1 = side_of(space, facets1)
+    side2 = side_of(space, facets2)
+    shared = np.isin(side1.nodes.numbers, side2.nodes.numbers)
     if shared.all():
         raise InputError(
-            f"'{one.name}' and '{two.name}' are the same nodes, so that nothing can part there: "
-            "mesh the bodies one by one, or cut the mesh open (meshes.cut.CutOpen)"
+            f"'{side1.name}' and '{side2.name}' are the same nodes, so that nothing can part "
+            "there: mesh the bodies one by one, or cut the mesh open (meshes.cut.CutOpen)"
         )
-    _refuse_common(one, two)
-    return one, two, shared
+    _refuse_common(side1, side2)
+    return side1, side2, shared
 
 
 def _pick_listed(
     space: FemSpace,
-    one: Side,
+    side1: Side,
     nodes: Nodes,
     matched: Matched,
     points: Sequence[Sequence[float]],
@@ -243,7 +243,7 @@ def _pick_listed(
 
     Args:
         space: the bodies' unknowns.
-        one: side 1.
+        side1: side 1.
         nodes: those of it with a condition.
         matched: what they face.
         points: (k, d) coordinates [m].
@@ -251,9 +251,9 @@ def _pick_listed(
     Returns:
         nodes and what they face, and a mask of the nodes of side 1 that are not listed.
     """
-    chosen = find_listed(space, nodes, points, one.name)
+    chosen = find_listed(space, nodes, points, side1.name)
     rows = np.concatenate([np.flatnonzero(nodes.numbers == number) for number in chosen])
-    others = np.isin(one.nodes.numbers, np.setdiff1d(nodes.numbers, chosen))
+    others = np.isin(side1.nodes.numbers, np.setdiff1d(nodes.numbers, chosen))
     return nodes.pick(rows), matched.pick(rows), others
 
 
@@ -272,8 +272,8 @@ def side_of(space: FemSpace, facets: Facets) -> Side:
 
 def _sort_nodes(
     space: FemSpace,
-    one: Side,
-    two: Side,
+    side1: Side,
+    side2: Side,
     nodes: Nodes,
     matched: Matched,
     *,
@@ -285,8 +285,8 @@ def _sort_nodes(
 
     Args:
         space: the bodies' unknowns.
-        one: side 1, of m nodes.
-        two: side 2.
+        side1: side 1, of m nodes.
+        side2: side 2.
         nodes: the matched nodes of side 1, a row for each face.
         matched: what they face.
         shared: (m,) nodes of both sides.
@@ -298,44 +298,44 @@ def _sort_nodes(
         with hardly anything in front of them, and what watches prescribed ones.
     """
     # nodes of both sides, and nodes tied over, cannot part
-    tied = one.nodes.numbers[np.asarray(one.tied) >= 0]
+    tied = side1.nodes.numbers[np.asarray(side1.tied) >= 0]
     opposite = np.concatenate([nodes.numbers, matched.carried])
     carried = np.setdiff1d(matched.carried, nodes.numbers)
-    can_part = ~np.isin(nodes.numbers, np.union1d(two.nodes.numbers, tied))
+    can_part = ~np.isin(nodes.numbers, np.union1d(side2.nodes.numbers, tied))
     nodes = nodes.pick(can_part)
     matched = matched.pick(can_part)
 
     # nodes that are held in every component have no condition
-    free = _find_unclamped(space, one.name, nodes, two, matched)
-    kinds = _sort_kinds(one, shared, opposite, nodes.numbers[~free])
-    kinds |= _sort_held_anywhere(space, one, kinds["clamped"])
+    free = _find_unclamped(space, side1.name, nodes, side2, matched)
+    kinds = _sort_kinds(side1, shared, opposite, nodes.numbers[~free])
+    kinds |= _sort_held_anywhere(space, side1, kinds["clamped"])
     watched: tuple[Watched, ...] = ()
     if watch:
-        watched = _watch_held(space, one, two, nodes.pick(~free), matched.pick(~free))
+        watched = _watch_held(space, side1, side2, nodes.pick(~free), matched.pick(~free))
 
     # what lies in front of the others: others carry nodes with little, if there are any
-    kinds["partly covered"] = np.isin(one.nodes.numbers, carried)
+    kinds["partly covered"] = np.isin(side1.nodes.numbers, carried)
     little = nodes.numbers[free & (matched.shares < LEAST_SHARE)]
-    kinds["hardly covered"] = np.isin(one.nodes.numbers, little)
-    _warn_of_coarse(space, one, two, little)
+    kinds["hardly covered"] = np.isin(side1.nodes.numbers, little)
+    _warn_of_coarse(space, side1, side2, little)
     kinds |= {
         "shared with another body": hinge & ~shared,
-        "tied to the other side": np.isin(one.nodes.numbers, tied),
+        "tied to the other side": np.isin(side1.nodes.numbers, tied),
     }
     kinds["in front of nothing"] &= ~kinds["tied to the other side"]
     return nodes.pick(free), matched.pick(free), kinds, watched
 
 
-def _sort_kinds(one: Side, shared: Mask, opposite: Indices, clamped: Indices) -> dict[str, Mask]:
+def _sort_kinds(side1: Side, shared: Mask, opposite: Indices, clamped: Indices) -> dict[str, Mask]:
     """Return kind -> mask (m,) of the nodes of side 1 that have no condition, as a census says it.
 
     Args:
-        one: side 1, of m nodes.
+        side1: side 1, of m nodes.
         shared: (m,) nodes of both sides.
         opposite: numbers of those in front of side 2.
         clamped: numbers of those that are clamped.
     """
-    numbers = one.nodes.numbers
+    numbers = side1.nodes.numbers
     return {
         "shared by both sides": shared,
         "clamped": np.isin(numbers, clamped),
@@ -343,48 +343,48 @@ def _sort_kinds(one: Side, shared: Mask, opposite: Indices, clamped: Indices) ->
     }
 
 
-def _warn_of_coarse(space: FemSpace, one: Side, two: Side, little: Indices) -> None:
+def _warn_of_coarse(space: FemSpace, side1: Side, side2: Side, little: Indices) -> None:
     """Warn, on rank 0, of nodes with a condition around which little of side 1 is covered.
 
     Args:
         space: the bodies' unknowns.
-        one: side 1.
-        two: side 2.
+        side1: side 1.
+        side2: side 2.
         little: numbers of these nodes.
     """
     if len(little) and space.comm.rank == 0:
-        where = at(one.nodes.points[np.searchsorted(one.nodes.numbers, little[0])])
+        where = at(side1.nodes.points[np.searchsorted(side1.nodes.numbers, little[0])])
         log.warning(
             "%d contact nodes of '%s', the first at %s, have hardly anything of '%s' in front of "
             "their facets, and no whole facet is near: their pressures are left out of the largest "
             "ones; make '%s' the first side, or mesh '%s' finer",
             len(little),
-            one.name,
+            side1.name,
             where,
-            two.name,
-            two.name,
-            one.name,
+            side2.name,
+            side2.name,
+            side1.name,
         )
 
 
-def _sort_held_anywhere(space: FemSpace, one: Side, clamped: Mask) -> dict[str, Mask]:
+def _sort_held_anywhere(space: FemSpace, side1: Side, clamped: Mask) -> dict[str, Mask]:
     """Return kind -> mask of the nodes of side 1 held in every component, at rest or moved.
 
     Collective.
 
     Args:
         space: the bodies' unknowns.
-        one: side 1, of m nodes.
+        side1: side 1, of m nodes.
         clamped: (m,) nodes held in every component.
     """
     # a rank knows of its own nodes only whether something moves them
-    own = sort_held(space, one.nodes, clamped)
+    own = sort_held(space, side1.nodes, clamped)
     moved = space.comm.max(own["prescribed"].astype(float)) > 0.0
     return {"clamped": clamped & ~moved, "prescribed": clamped & moved}
 
 
 def _watch_held(
-    space: FemSpace, one: Side, two: Side, nodes: Nodes, matched: Matched
+    space: FemSpace, side1: Side, side2: Side, nodes: Nodes, matched: Matched
 ) -> tuple[Watched, ...]:
     """Return what watches nodes of side 1 that are held in every component. Collective.
 
@@ -392,29 +392,29 @@ def _watch_held(
 
     Args:
         space: the bodies' unknowns.
-        one: side 1.
-        two: side 2.
+        side1: side 1.
+        side2: side 2.
         nodes: the held nodes of side 1, of all ranks.
         matched: what they face.
     """
     # what faces no free node of side 2
-    free_share = matched.P @ (~two.nodes.held.all(axis=1)).astype(float)
+    free_share = matched.P @ (~side2.nodes.held.all(axis=1)).astype(float)
     known = np.asarray(free_share) == 0.0
     nodes = nodes.pick(known)
     matched = matched.pick(np.flatnonzero(known))
     if not len(nodes.numbers):
         return ()
     directions = snap_to_axes(nodes.normals)
-    gap = _measure_gap(space, one.name, two, nodes, directions, matched)
+    gap = _measure_gap(space, side1.name, side2, nodes, directions, matched)
     own = np.flatnonzero(space.blocks_of(nodes.numbers) >= 0)
-    opposite = Facing(two.nodes, sp.csr_matrix(matched.P[own]))
+    opposite = Facing(side2.nodes, sp.csr_matrix(matched.P[own]))
     return watch_nodes(
-        space, one.name, nodes.pick(own), directions[own], gap[own], opposite, two.name
+        space, side1.name, nodes.pick(own), directions[own], gap[own], opposite, side2.name
     )
 
 
 def _borrow(
-    space: FemSpace, facets: Facets, one: Side, kinds: dict[str, Mask], having: Indices
+    space: FemSpace, facets: Facets, side1: Side, kinds: dict[str, Mask], having: Indices
 ) -> Borrowed | None:
     """Return what nodes of side 1 without a pressure of their own take of neighbours. Collective.
 
@@ -423,7 +423,7 @@ def _borrow(
     Args:
         space: the bodies' unknowns.
         facets: those of side 1.
-        one: side 1.
+        side1: side 1.
         kinds: what became of its nodes.
         having: numbers of this rank's nodes with a pressure.
     """
@@ -431,81 +431,81 @@ def _borrow(
         [mask for kind, mask in kinds.items() if kind not in ("in front of nothing", "not listed")],
         axis=0,
     )
-    return borrow(space, facets, one.nodes.numbers[without], having)
+    return borrow(space, facets, side1.nodes.numbers[without], having)
 
 
-def _mark_hinges(space: FemSpace, one: Side, two: Side, shared: Mask, *, allowed: bool) -> Mask:
+def _mark_hinges(space: FemSpace, side1: Side, side2: Side, shared: Mask, *, allowed: bool) -> Mask:
     """Return a mask (m,) of the nodes of side 1 that only glue bodies together. Collective.
 
     Args:
         space: the bodies' unknowns.
-        one: side 1, of m nodes.
-        two: side 2.
+        side1: side 1, of m nodes.
+        side2: side 2.
         shared: (m,) nodes of both sides.
         allowed: whether bodies may hang together so.
 
     Raises:
         InputError: there are some, and they are not ``allowed``.
     """
-    numbers = np.union1d(one.nodes.numbers, two.nodes.numbers)
-    clamped = [side.nodes.numbers[side.nodes.held.all(axis=1)] for side in (one, two)]
+    numbers = np.union1d(side1.nodes.numbers, side2.nodes.numbers)
+    clamped = [side.nodes.numbers[side.nodes.held.all(axis=1)] for side in (side1, side2)]
     hinges = find_hinges(space, np.setdiff1d(numbers, np.concatenate(clamped)))
-    here = np.isin(one.nodes.numbers, hinges)
+    here = np.isin(side1.nodes.numbers, hinges)
     if not allowed:
-        refuse_hinges("contact_pair", (one.name, two.name), one.nodes.points[here & shared])
-        for side in (one, two):
+        refuse_hinges("contact_pair", (side1.name, side2.name), side1.nodes.points[here & shared])
+        for side in (side1, side2):
             there = np.isin(side.nodes.numbers, hinges)
             refuse_hinges("contact_pair", (side.name,), side.nodes.points[there])
     return np.asarray(here)
 
 
-def _find_tied_over(space: FemSpace, one: Side, two: Side) -> Indices:
+def _find_tied_over(space: FemSpace, side1: Side, side2: Side) -> Indices:
     """Find the nodes of side 2 to which those of side 1 are tied in all components.
 
     Such nodes cannot part, as the two sides of a weld.
 
     Args:
         space: the bodies' unknowns.
-        one: side 1, of m nodes.
-        two: side 2.
+        side1: side 1, of m nodes.
+        side2: side 2.
 
     Returns:
         (m,) places on side 2; of several, as where ties meet, the nearest one; -1 for none.
     """
-    places = np.full(len(one.nodes.numbers), -1)
+    places = np.full(len(side1.nodes.numbers), -1)
     if not len(space.tied_nodes):
         return places
     # nodes that follow one leader move as one
-    own = space.leaders(one.nodes.numbers)
-    others = space.leaders(two.nodes.numbers)
-    tied = np.isin(one.nodes.numbers, space.tied_nodes) & (own >= 0) & np.isin(own, others)
+    own = space.leaders(side1.nodes.numbers)
+    others = space.leaders(side2.nodes.numbers)
+    tied = np.isin(side1.nodes.numbers, space.tied_nodes) & (own >= 0) & np.isin(own, others)
     for row in np.flatnonzero(tied):
         alike = np.flatnonzero(others == own[row])
-        apart = np.linalg.norm(two.nodes.points[alike] - one.nodes.points[row], axis=1)
+        apart = np.linalg.norm(side2.nodes.points[alike] - side1.nodes.points[row], axis=1)
         places[row] = alike[np.argmin(apart)]
     return places
 
 
-def _refuse_common(one: Side, two: Side) -> None:
+def _refuse_common(side1: Side, side2: Side) -> None:
     """Raise InputError for a facet that is listed on both sides."""
-    own, others = number_alike(*(side.nodes.numbers[side.facets] for side in (one, two)))
+    own, others = number_alike(*(side.nodes.numbers[side.facets] for side in (side1, side2)))
     for facet in np.flatnonzero(np.isin(own, others))[:1]:
-        where = at(one.nodes.points[one.facets[facet]].mean(axis=0))
+        where = at(side1.nodes.points[side1.facets[facet]].mean(axis=0))
         raise InputError(
-            f"a facet of both '{one.name}' and '{two.name}' at {where}: a facet cannot touch "
+            f"a facet of both '{side1.name}' and '{side2.name}' at {where}: a facet cannot touch "
             "itself, so list it on one side only"
         )
 
 
 def _divide_faces(
-    space: FemSpace, facets1: Facets, one: Side, angle: float
+    space: FemSpace, facets1: Facets, side1: Side, angle: float
 ) -> list[tuple[Side, Array]]:
     """Divide side 1 into its smooth faces, each a side by itself. Collective.
 
     Args:
         space: the bodies' unknowns.
         facets1: the facets of side 1.
-        one: side 1.
+        side1: side 1.
         angle: that up to which facets round a node are one face [rad].
 
     Returns:
@@ -519,35 +519,35 @@ def _divide_faces(
     around = gather_boundary(space, facets1, beyond=angle)
     if len(around.vertices):
         around = gather_boundary(space, facets1)
-    nodes, facet = split_at_corners(space, around, one.nodes, angle)
-    if len(nodes.numbers) == len(one.nodes.numbers):
-        return [(one, one.nodes.normals)]
+    nodes, facet = split_at_corners(space, around, side1.nodes, angle)
+    if len(nodes.numbers) == len(side1.nodes.numbers):
+        return [(side1, side1.nodes.normals)]
 
     # each face has the nodes of its facets; of a node with several rows it has the one of the face
     face_of = around.faces(angle)
     faces = []
     for face in range(int(face_of.max()) + 1):
-        facets = one.facets[face_of == face]
+        facets = side1.facets[face_of == face]
         used = np.unique(facets)
-        inside = np.isin(nodes.numbers, one.nodes.numbers[used]) & (
+        inside = np.isin(nodes.numbers, side1.nodes.numbers[used]) & (
             (facet < 0) | (face_of[facet] == face)
         )
         own = nodes.pick(inside)
         if len(own.numbers) > len(used):
             again = own.points[1:][np.diff(own.numbers) == 0][0]
             raise InputError(
-                f"'{one.name}' turns round and meets itself at {at(again)}: give it as two "
+                f"'{side1.name}' turns round and meets itself at {at(again)}: give it as two "
                 "boundaries (fem.joined_surfaces), or treat the corner as smooth (a larger "
                 "feature_angle=)"
             )
-        tied = None if one.tied is None else one.tied[used]
-        side = Side(one.name, own, np.searchsorted(used, facets), tied)
-        faces.append((side, one.nodes.normals[used]))
+        tied = None if side1.tied is None else side1.tied[used]
+        side = Side(side1.name, own, np.searchsorted(used, facets), tied)
+        faces.append((side, side1.nodes.normals[used]))
     return faces
 
 
 def _match_faces(
-    faces: Sequence[tuple[Side, Array]], two: Side, matching: Matching, size: float
+    faces: Sequence[tuple[Side, Array]], side2: Side, matching: Matching, size: float
 ) -> tuple[Nodes, Matched]:
     """Match all faces of side 1, and put what they face together.
 
@@ -556,7 +556,7 @@ def _match_faces(
 
     Args:
         faces: those of side 1, and the normals of their nodes over the whole side.
-        two: side 2.
+        side2: side 2.
         matching: how nodes find what they face.
         size: that of the mesh [m].
 
@@ -569,7 +569,7 @@ def _match_faces(
     matches: list[Matched] = []
     for side, mean in faces:
         try:
-            matched = _match_face(side, mean, two, matching, size)
+            matched = _match_face(side, mean, side2, matching, size)
         except InputError as error:
             if not getattr(matching, "partial", False):
                 raise
@@ -598,7 +598,7 @@ def _match_faces(
     return replace(nodes, weights=weights).pick(order), whole.pick(order)
 
 
-def _match_face(side: Side, mean: Array, two: Side, matching: Matching, size: float) -> Matched:
+def _match_face(side: Side, mean: Array, side2: Side, matching: Matching, size: float) -> Matched:
     """Return what a face of side 1 faces: along its own normals, else along mean ones.
 
     Across a gap the partner of a corner lies on the bisector of its faces, along the mean of their
@@ -608,30 +608,34 @@ def _match_face(side: Side, mean: Array, two: Side, matching: Matching, size: fl
     Args:
         side: a face of side 1.
         mean: (n, d) normals of its nodes over the whole side.
-        two: side 2.
+        side2: side 2.
         matching: how nodes find what they face.
         size: that of the mesh [m].
     """
     try:
-        return matching.match(side, two, size)
+        return matching.match(side, side2, size)
     except InputError:
         if getattr(matching, "partial", False) or np.array_equal(mean, side.nodes.normals):
             raise
         try:
-            return matching.match(replace(side, nodes=replace(side.nodes, normals=mean)), two, size)
+            return matching.match(
+                replace(side, nodes=replace(side.nodes, normals=mean)), side2, size
+            )
         except InputError:
             pass
         raise
 
 
-def _find_unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched: Matched) -> Mask:
+def _find_unclamped(
+    space: FemSpace, name: str, nodes: Nodes, side2: Side, matched: Matched
+) -> Mask:
     """Return a mask (m,) of the matched nodes that are not clamped.
 
     Args:
         space: the bodies' unknowns.
         name: that of side 1.
         nodes: its matched nodes.
-        two: side 2.
+        side2: side 2.
         matched: what they face.
 
     Raises:
@@ -639,16 +643,16 @@ def _find_unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched
     """
     clamped = nodes.held.all(axis=1)
     facing = np.asarray(matched.P.argmax(axis=1)).ravel()
-    lost = np.flatnonzero(clamped & ~two.nodes.held[facing].all(axis=1))
+    lost = np.flatnonzero(clamped & ~side2.nodes.held[facing].all(axis=1))
     if len(lost):
         raise InputError(
             f"contact node {at(nodes.points[lost[0]])} of '{name}' is clamped but faces a free "
-            f"node of '{two.name}': make '{two.name}' the first side, or clamp less"
+            f"node of '{side2.name}': make '{side2.name}' the first side, or clamp less"
         )
     if clamped.all():
         raise InputError(
-            f"no contact nodes: every node of '{name}' that faces '{two.name}' is clamped, on both "
-            "sides or tied to the other side; clamp or tie less"
+            f"no contact nodes: every node of '{name}' that faces '{side2.name}' is clamped, on "
+            "both sides or tied to the other side; clamp or tie less"
         )
     if clamped.any() and space.comm.rank == 0:
         log.info("%d clamped nodes of '%s' are left out of the contact", clamped.sum(), name)
@@ -656,7 +660,7 @@ def _find_unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched
 
 
 def _measure_gap(
-    space: FemSpace, name: str, two: Side, nodes: Nodes, directions: Array, matched: Matched
+    space: FemSpace, name: str, side2: Side, nodes: Nodes, directions: Array, matched: Matched
 ) -> Array:
     """Return initial gaps n·(P x_2 - x_1) >= 0 (m,) [m].
 
@@ -665,7 +669,7 @@ def _measure_gap(
     Args:
         space: the bodies' unknowns.
         name: that of side 1.
-        two: side 2.
+        side2: side 2.
         nodes: m nodes of side 1.
         directions: (m, d) unit vectors n towards side 2.
         matched: what they face.
@@ -673,13 +677,13 @@ def _measure_gap(
     Raises:
         InputError: a larger overlap.
     """
-    gap = np.sum((matched.P @ two.nodes.points - nodes.points) * directions, axis=1)
+    gap = np.sum((matched.P @ side2.nodes.points - nodes.points) * directions, axis=1)
     behind = -gap - np.maximum(matched.overlap, 1e-12 * space.size)
     if behind.max() > 0.0:
         worst = int(np.argmax(behind))
         raise InputError(
-            f"'{two.name}' lies {-gap[worst]:.3g} m behind '{name}' at {at(nodes.points[worst])}: "
-            "the bodies overlap there, or these are not the boundaries between them; choose the "
+            f"'{side2.name}' lies {-gap[worst]:.3g} m behind '{name}' at {at(nodes.points[worst])}"
+            ": the bodies overlap there, or these are not the boundaries between them; choose the "
             "sides that face, or draw the bodies in touch and make a press fit by "
             "fem.InitialStrain, the strain of the body that is too large, or by quasi_static on "
             "surface.moving(towards=…), its overlap"
@@ -688,7 +692,7 @@ def _measure_gap(
         log.warning(
             "'%s' and '%s' overlap by up to %.3g m: they count as touching there",
             name,
-            two.name,
+            side2.name,
             -gap.min(),
         )
     return np.maximum(gap, 0.0)

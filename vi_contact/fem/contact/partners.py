@@ -35,22 +35,22 @@ class Surface:
         return self.points[self.facets[(self.facets == node).any(axis=1)]]
 
 
-def in_front(one: Surface, node: int, normal: Array, two: Surface, partner: int) -> Mask:
+def in_front(surface1: Surface, node: int, normal: Array, surface2: Surface, partner: int) -> Mask:
     """Return a mask (m,) of the facets at a node that facets at its partner lie in front of.
 
     They are seen along the normal, as corners of a plane round the node. A facet at the node counts
     where its middle lies in the corner of a facet at the partner.
 
     Args:
-        one: side 1.
+        surface1: side 1.
         node: the place of the node on side 1.
         normal: (d,) its normal.
-        two: side 2.
+        surface2: side 2.
         partner: the place of its partner on side 2.
     """
     frame = nodal_frames(normal[None])[0][:, 1:]
-    ways = (one.around(node).mean(axis=1) - one.points[node]) @ frame
-    arms = (two.around(partner) - two.points[partner]) @ frame
+    ways = (surface1.around(node).mean(axis=1) - surface1.points[node]) @ frame
+    arms = (surface2.around(partner) - surface2.points[partner]) @ frame
     covered = np.zeros(len(ways), dtype=bool)
     for arm in arms:
         covered |= _within(ways, arm)
@@ -58,10 +58,10 @@ def in_front(one: Surface, node: int, normal: Array, two: Surface, partner: int)
 
 
 def choose_partner(
-    one: Surface,
+    surface1: Surface,
     node: int,
     normal: Array,
-    two: Surface,
+    surface2: Surface,
     partners: Indices,
     apart: Array,
     close: float,
@@ -69,10 +69,10 @@ def choose_partner(
     """Choose among several partners the one that a node of side 1 faces.
 
     Args:
-        one: side 1.
+        surface1: side 1.
         node: the place of the node on side 1.
         normal: (d,) its normal.
-        two: side 2.
+        surface2: side 2.
         partners: (k,) places on side 2, of nodes that face this one. The first is taken where none
             has a facet in front of one of side 1, as where bodies meet at a corner only.
         apart: (k,) their distances [m]; partners that differ by up to ``close`` [m] are at one
@@ -82,7 +82,7 @@ def choose_partner(
     Returns:
         the place of the partner on side 2, -1 where no single one is right.
     """
-    seen = np.array([in_front(one, node, normal, two, partner) for partner in partners])
+    seen = np.array([in_front(surface1, node, normal, surface2, partner) for partner in partners])
     facing = np.flatnonzero(seen.any(axis=1))
     if len(facing) < 2:
         return int(partners[facing[0] if len(facing) else 0])

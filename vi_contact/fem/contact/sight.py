@@ -367,11 +367,11 @@ def nearest(pieces: Pieces, several: Mask, size: Array) -> Pieces:
     piece, other = pairs_of(ours.look)
     hides = np.zeros(len(piece), dtype=bool)
     for rows in np.array_split(np.arange(len(piece)), 1 + len(piece) // PAIRS):
-        one = ours.pick(piece[rows])
-        two = ours.pick(other[rows])
-        common = intersect(one.polygons, two.polygons)
+        front = ours.pick(other[rows])
+        back = ours.pick(piece[rows])
+        common = intersect(back.polygons, front.polygons)
         middles = common.mean(axis=1, keepdims=True)
-        behind = two.distances(middles) < one.distances(middles)
+        behind = front.distances(middles) < back.distances(middles)
         hides[rows] = (areas(common) > least[piece[rows]]) & behind[:, 0]
     piece = piece[hides]
     other = other[hides]
@@ -404,6 +404,8 @@ def pairs_of(groups: Indices) -> tuple[Indices, Indices]:
     # each member of a group of n is followed by n others, that count up from the group's first
     start = np.repeat(first, counts)
     count = np.repeat(counts, counts)
-    one = np.repeat(np.arange(len(groups)), count)
-    two = np.arange(len(one)) - np.repeat(np.cumsum(count) - count, count) + np.repeat(start, count)
-    return one[one != two], two[one != two]
+    place = np.repeat(np.arange(len(groups)), count)
+    # how many pairs of this place came before, added to the first of its group
+    before = np.arange(len(place)) - np.repeat(np.cumsum(count) - count, count)
+    other = before + np.repeat(start, count)
+    return place[place != other], other[place != other]
