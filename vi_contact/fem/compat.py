@@ -421,8 +421,8 @@ def cell_space(mesh: Mesh) -> Any:
 def expression(expr: Any, space: Any) -> Any:
     """Make what ``Function.interpolate`` takes of an expression of UFL, for a space."""
     points = space.element.interpolation_points
-    there = points() if callable(points) else points  # a property since 0.10
-    return _compile_by(space.mesh.comm, lambda: fem.Expression(expr, there))
+    places = points() if callable(points) else points  # a property since 0.10
+    return _compile_by(space.mesh.comm, lambda: fem.Expression(expr, places))
 
 
 def constant(mesh: Mesh, value: float) -> Any:

@@ -51,38 +51,38 @@ def takes(name: str, call: Any, *arguments: str) -> None:
         return
 
 
-def form_of(said: str, call: Callable[..., Any], space: FemSpace, *arguments: Any) -> Any:
+def form_of(owner: str, call: Callable[..., Any], space: FemSpace, *arguments: Any) -> Any:
     """Return call(*arguments), a form linear in all of them on the mesh of the space. Collective.
 
     Args:
-        said: the beginning of messages.
+        owner: who asks, the beginning of messages.
         call: the user's function that makes the form.
         space: that of the displacement.
         *arguments: what the form is linear in.
 
     Raises:
-        InputError: on all ranks otherwise; it begins with ``said``.
+        InputError: on all ranks otherwise; it begins with ``owner``.
     """
-    form = on_all(space.comm, said, lambda: call(*arguments))
+    form = on_all(space.comm, owner, lambda: call(*arguments))
     instance(
-        said,
+        owner,
         "what it returns",
         form,
         ufl.Form,
         "return an integral, such as ufl.inner(…, …) * ufl.dx",
     )
-    if set(on_all(space.comm, said, form.arguments)) != set(arguments):
+    if set(on_all(space.comm, owner, form.arguments)) != set(arguments):
         raise InputError(
-            f"{said} is not a form in the given trial and test functions; return one that is not "
+            f"{owner} is not a form in the given trial and test functions; return one that is not "
             "zero and is linear in each of them"
         )
-    on_all(space.comm, said, lambda: refuse_not_linear(said, form))
+    on_all(space.comm, owner, lambda: refuse_not_linear(owner, form))
     own = space.mesh.ufl_domain().ufl_id()
     spaces = [getattr(part, "function_space", space.V) for part in form.coefficients()]
     elsewhere = any(domain.ufl_id() != own for domain in form.ufl_domains())
     if elsewhere or any(V.mesh is not space.mesh for V in spaces):
         raise InputError(
-            f"{said} is of another mesh; give measures and Functions of the mesh of the body"
+            f"{owner} is of another mesh; give measures and Functions of the mesh of the body"
         )
     if any(integral.integral_type() == "interior_facet" for integral in form.integrals()):
         # with ghosts of nodes alone no rank knows both cells of a facet between ranks
@@ -90,19 +90,19 @@ def form_of(said: str, call: Callable[..., Any], space: FemSpace, *arguments: An
         nodes, cells = space.comm.sum(np.array([local.num_ghosts for local in maps]))
         if nodes and not cells:
             raise InputError(
-                f"{said} integrates over interior facets (dS), which on several ranks needs a mesh "
-                "with ghost_mode=shared_facet"
+                f"{owner} integrates over interior facets (dS), which on several ranks needs a "
+                "mesh with ghost_mode=shared_facet"
             )
     return form
 
 
-def refuse_not_linear(said: str, form: Any) -> None:
+def refuse_not_linear(owner: str, form: Any) -> None:
     """Raise InputError unless UFL finds a form linear in its arguments.
 
     It is asked here, on every rank: the compiler asks on one, and the others would wait for it.
 
     Args:
-        said: the beginning of messages.
+        owner: who asks, the beginning of messages.
         form: the form.
     """
     try:
@@ -110,7 +110,7 @@ def refuse_not_linear(said: str, form: Any) -> None:
     except (ArityMismatch, TypeError, ValueError):
         # the first is no Exception; others where UFL words it and fails
         raise InputError(
-            f"{said} is not linear in u or in v; return a sum of products of one and the other"
+            f"{owner} is not linear in u or in v; return a sum of products of one and the other"
         ) from None
 
 

@@ -120,12 +120,12 @@ def _make_tensors(
     shape = shape_of(value)
     sizes = {*dimensions, *(3 for d in dimensions if d == 2)}
     if shape != leading and shape not in {(*leading, n, n) for n in sizes}:
-        what = f"is {shown(value)}" if -1 in shape else f"has shape {shape}"
+        fault = f"is {shown(value)}" if -1 in shape else f"has shape {shape}"
         remedy = "a number, a tensor (d, d) or in the plane (3, 3)"
         if leading:
             k = leading[0]
             remedy = f"numbers ({k},), tensors ({k}, d, d) or in the plane ({k}, 3, 3)"
-        raise InputError(f"{owner}: value {what}; give {remedy}")
+        raise InputError(f"{owner}: value {fault}; give {remedy}")
     strains = array(owner, "value", value, shape)
     return np.multiply.outer(strains, np.eye(3)) if shape == leading else strains
 
@@ -226,8 +226,8 @@ class InitialStrains:
             if strain.cells is not None:
                 part = cells_of("InitialStrain", "cells", strain.cells, self._space.mesh)
                 where = np.ravel(blocks[part.indices])
-            at = partial(strain.at, points[where, : self._space.dimension])
-            own = evaluate("InitialStrain", at, np.empty((len(where), 9)), t, self._space.comm)
+            ask = partial(strain.at, points[where, : self._space.dimension])
+            own = evaluate("InitialStrain", ask, np.empty((len(where), 9)), t, self._space.comm)
             if only is None and strain.history is not None:
                 own = strain.history(t) * own
             values[where] += own

@@ -251,11 +251,13 @@ def _refuse_moved(
         problem: the problem that begins.
         begun: its first state.
     """
-    there = problem.system.space.expand(problem.cartesian(begun.u), 0.0)  # type: ignore[attr-defined]
+    # how far nodes of the body, and gaps of its conditions, are from where the stage has left them
+    space: FemSpace = problem.system.space  # type: ignore[assignment]
+    begins = space.expand(problem.cartesian(begun.u), 0.0)
     before = static.surface.gap(state.t) - static.surface.normal_values(state.u)
     after = problem.surface.gap(0.0) - problem.surface.normal_values(begun.u)
-    away = max(max_abs((there - nodal).ravel()), max_abs(after - before))
-    distance, size = problem.surface.comm.max(np.array([away, max_abs(nodal.ravel())]))
+    own = max(max_abs((begins - nodal).ravel()), max_abs(after - before))
+    distance, size = problem.surface.comm.max(np.array([own, max_abs(nodal.ravel())]))
     if distance > BALANCED * size:
         raise InputError(
             f"a support or tie of the problem is {distance:.3g} m away from where the static stage "

@@ -177,13 +177,15 @@ class NodeToNode:
         from scipy.spatial import cKDTree  # late: it takes a while
 
         # the nearest nodes first
-        away, nearby = cKDTree(side2.nodes.points).query(x, k=np.arange(1, min(NEARBY, count) + 1))
+        tree = cKDTree(side2.nodes.points)
+        distances, nearby = tree.query(x, k=np.arange(1, min(NEARBY, count) + 1))
         partner, along, turned, crowds = _find_opposite(
             side1.nodes, side2.nodes, np.sort(nearby, axis=1), reach
         )
         # what is as near along the normal, or nearer, lies in a ball of this size: unless all of it
         # was looked at, all nodes are
-        unsure = np.flatnonzero((1.0 + 1e-9) * np.hypot(along + reach, reach) >= away[:, -1])
+        ball = (1.0 + 1e-9) * np.hypot(along + reach, reach)
+        unsure = np.flatnonzero(ball >= distances[:, -1])
         whole = np.arange(count)[None, :]
         groups = max(-(-len(unsure) * count // DISTANCES), 1)
         for rows in np.array_split(unsure, groups):
@@ -192,19 +194,19 @@ class NodeToNode:
             partner[rows], _, turned[rows], more = _find_opposite(
                 side1.nodes.pick(rows), side2.nodes, whole, reach[rows]
             )
-            crowds |= {int(rows[row]): crowd for row, crowd in more.items()}
+            crowds |= {int(rows[row]): places for row, places in more.items()}
         # where several nodes lie at one place, facets tell which is the partner
         surface1 = Surface(x, side1.facets)
         surface2 = Surface(side2.nodes.points, side2.facets)
-        for row, (these, apart) in sorted(crowds.items()):
-            offset = side2.nodes.points[these] - side2.nodes.points[these[0]]
+        for row, (crowd, apart) in sorted(crowds.items()):
+            offset = side2.nodes.points[crowd] - side2.nodes.points[crowd[0]]
             alike = np.linalg.norm(offset, axis=1) <= together[row]
             chosen = choose_partner(
                 surface1,
                 row,
                 side1.nodes.normals[row],
                 surface2,
-                these[alike],
+                crowd[alike],
                 apart[alike],
                 ONE_PLACE * reach[row],
             )
@@ -258,9 +260,9 @@ def _find_opposite(
     for row in np.flatnonzero(
         any_there & (np.sum(distance <= (least + reach)[:, None], axis=1) > 1)
     ):
-        these = np.flatnonzero(distance[row] <= least[row] + reach[row])
-        these = np.concatenate([[nearest[row]], these[these != nearest[row]]])
-        crowds[int(row)] = places[row, these], distance[row, these]
+        close = np.flatnonzero(distance[row] <= least[row] + reach[row])
+        close = np.concatenate([[nearest[row]], close[close != nearest[row]]])
+        crowds[int(row)] = places[row, close], distance[row, close]
     return partner, distance[rows, nearest], near.any(axis=1) & ~any_there, crowds
 
 

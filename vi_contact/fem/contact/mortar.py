@@ -277,8 +277,8 @@ def _carry(
     weights = part.own.sum(axis=1)
     inverse = np.linalg.inv(part.own)
     # E: what each node that carries counts at each node of this segment
-    there = part.places(points[by])[None, :, None]
-    shares = extrapolation(there, part.places(part.ends)[None, :, None])[0]
+    carrying = part.places(points[by])[None, :, None]
+    shares = extrapolation(carrying, part.places(part.ends)[None, :, None])[0]
     for i, (node, weight) in enumerate(zip(part.nodes, weights, strict=True)):
         # who has the condition of this node: the nodes that carry it, or itself
         carriers = zip(by, shares[i], strict=True) if carried[node] else [(node, 1.0)]

@@ -247,12 +247,13 @@ def in_space(side1: Side, side2: Side) -> Coupled:
         pieces, covered = opposite(some, theirs, tree)
         pieces = pieces.pick(np.flatnonzero((covered > ROUND_OFF)[pieces.look]))
         # number the looks anew that have pieces
-        kept, look = np.unique(pieces.look, return_inverse=True)
-        if not len(kept):
+        with_pieces, look = np.unique(pieces.look, return_inverse=True)
+        if not len(with_pieces):
             continue
-        some = some.pick(kept)
+        some = some.pick(with_pieces)
         pieces = replace(pieces, look=look.ravel())
-        blocks.append(_Block(some, pieces, covered[kept], *integrate(some, pieces)))
+        own, mixed = integrate(some, pieces)
+        blocks.append(_Block(some, pieces, covered[with_pieces], own, mixed))
     covered_parts = _measure_cover(ours, blocks, common_nodes(side1, side2) >= 0)
     return couple(covered_parts, lambda carried: _assemble(side1, side2, theirs, blocks, carried))
 
@@ -395,16 +396,15 @@ def _carry(
     place[rows] = np.arange(len(rows))
     own = block.own[rows]
     # E of the nodes that carry, as the look sees them, and their weights D_k = sum_t E_tk D_t
-    there = points[by[rows]] - some.middles[:, None, :]
-    seen = np.einsum("kvi,kic->kvc", there, some.frames)
+    offset = points[by[rows]] - some.middles[:, None, :]
+    seen = np.einsum("kvi,kic->kvc", offset, some.frames)
     shares = extrapolation(seen, some.polygons) * borne[rows][:, :, None]
     weights = np.einsum("kpv,kp->kv", shares, own.sum(axis=2))
     np.add.at(D, by[rows], weights)
     # psi_k = D_k b(x)ᵀ G⁻¹ b(x_k), in the functions of the facet: b(x) = sum_i b(x_i) phi_i
-    nodal, inverse, offset = linear_functions(some, own)
-    beyond = np.concatenate(
-        [np.ones((*seen.shape[:2], 1)), (seen - offset) / some.reach[:, None, None]], axis=2
-    )
+    nodal, inverse, middles = linear_functions(some, own)
+    ones = np.ones((*seen.shape[:2], 1))
+    beyond = np.concatenate([ones, (seen - middles) / some.reach[:, None, None]], axis=2)
     functions = weights[:, :, None] * (beyond @ inverse @ nodal.swapaxes(1, 2))
     among = np.flatnonzero(place[pieces.look] >= 0)
     look = place[pieces.look[among]]

@@ -103,10 +103,10 @@ class Watched:
         ]
         driven = list(chain(*from_each(self.space.comm, own)))
         depth, _, point = max(driven, key=lambda node: node[:2])
-        what = "its obstacle" if self.side is None else f"'{self.side}'"
+        obstacle = "its obstacle" if self.side is None else f"'{self.side}'"
         raise InputError(
             f"contact node {at(point)} of '{self.name}' is prescribed in every component and is "
-            f"driven {depth:.3g} m into {what} at t = {t:.6g} s: prescribe a motion that keeps "
+            f"driven {depth:.3g} m into {obstacle} at t = {t:.6g} s: prescribe a motion that keeps "
             "off, or only the components at right angles to its contact direction"
         )
 

@@ -111,12 +111,12 @@ class Group:
         refuse([defect], MpiComm(mesh.comm))
         if not mesh.comm.allreduce(len(chosen)):
             known = np.unique(np.concatenate(mesh.comm.allgather(np.unique(values))))
-            there = ", ".join(map(str, known[:MOST_NAMED]))
+            listing = ", ".join(map(str, known[:MOST_NAMED]))
             if len(known) > MOST_NAMED:
-                there += ", …"
+                listing += ", …"
             raise InputError(
                 f"{owner}: no {things} have the value {value} of '{name}'; give one of "
-                f"{there or 'none'}"
+                f"{listing or 'none'}"
             )
         return cls(name, chosen, mesh)
 
