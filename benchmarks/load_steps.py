@@ -101,10 +101,10 @@ def block(comm: Any, cells: int) -> Block:
     energy = W * ufl.dx
 
     top = compat.entities_where(on, 1, lambda x: np.isclose(x[1], HEIGHT))
-    bc = dolfinx.fem.dirichletbc(g, compat.facet_dofs(V, top))
+    bc = dolfinx.fem.dirichletbc(g, compat.locate_blocks(V, top))
 
     # The floor bounds the vertical component at all nodes of the boundary; the others are free.
-    boundary = compat.facet_dofs(
+    boundary = compat.locate_blocks(
         V, compat.entities_where(on, 1, lambda x: np.full(x.shape[1], True))
     )
     floor.x.array[:] = -np.inf

@@ -47,7 +47,7 @@ from petsc4py import PETSc  # noqa: E402
 import vi_contact as vc  # noqa: E402
 from vi_contact import fem  # noqa: E402
 from vi_contact.core.verify import kkt_residual  # noqa: E402
-from vi_contact.fem.mesh.communicators import give_back, kept  # noqa: E402
+from vi_contact.fem.mesh.communicators import give_back, keep_communicator  # noqa: E402
 
 COMM = MPI.COMM_WORLD
 NU, CONTRAST, WEIGHT = 0.3, 10.0, 0.02  # E and rho of the lower layer are 1
@@ -80,7 +80,7 @@ class Memory:
     def forget(self) -> None:
         """Free what nobody holds, and begin a new largest value."""
         gc.collect()
-        give_back(kept(COMM))
+        give_back(keep_communicator(COMM))
         with suppress(OSError):
             Path("/proc/self/clear_refs").write_text("5")
 

@@ -85,7 +85,7 @@ def test_without_a_compiler_a_form_is_one_sentence_on_all_ranks(monkeypatch, sha
 def test_other_errors_of_forms_stay_what_they_are():
     """A form that is wrong is not told as a missing compiler."""
     with pytest.raises(RuntimeError, match="^of something else$"):
-        compat._compiling(MPI.COMM_WORLD, lambda: _raise(RuntimeError("of something else")))
+        compat._compile_by(MPI.COMM_WORLD, lambda: _raise(RuntimeError("of something else")))
 
 
 def _raise(error):

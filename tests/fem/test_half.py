@@ -152,7 +152,7 @@ def test_rows_of_a_node_may_have_entries_in_different_places() -> None:
             0.0  # the own block is met after the far one
         )
     rows = sp.csr_matrix(dense[first : first + n])
-    held = algebra.held(aij_of(rows, COMM))
+    held = algebra.store(aij_of(rows, COMM))
     assert isinstance(held, half.Half)
     x = np.sin(np.arange(n * COMM.size) + 1.0)
     assert alike(held @ x[first : first + n], rows @ x)

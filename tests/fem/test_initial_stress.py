@@ -58,7 +58,7 @@ def added(problem: ContactProblem, state: State) -> PetscMatrix:
     """K_G alone, on the free unknowns (K + K_G minus K would lose its digits)."""
     space = problem.system.space
     full = initial_stress_matrix(space, space.expand(problem.cartesian(state.u), state.t))
-    return PetscMatrix(space.reduced(full))
+    return PetscMatrix(space.reduce(full))
 
 
 def rotation(problem: ContactProblem, about: Array, axis: Array) -> Array:

@@ -24,11 +24,11 @@ from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.fem.body.assembly import assemble
 from vi_contact.fem.body.loads import BodyForce, Prescribed
-from vi_contact.fem.contact.clipping import areas, hats, overlaps, rule, without
+from vi_contact.fem.contact.clipping import areas, hats, intersect, rule, subtract
 from vi_contact.fem.contact.joined import joined_surfaces
 from vi_contact.fem.contact.matching import Matched, Side
 from vi_contact.fem.contact.mortar import DualMortar
-from vi_contact.fem.contact.nodes import Nodes, joined_nodes
+from vi_contact.fem.contact.nodes import Nodes, join_nodes
 from vi_contact.fem.contact.pairs import contact_pair
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.mesh.tagged_mesh import Facets, build_mesh
@@ -129,11 +129,11 @@ def test_polygons():
     square = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
     one = square + 0.3 * random.random((200, 4, 2))
     two = np.array([(0.2, -0.3), (1.4, 0.5), (-0.1, 0.8)]) + 0.3 * random.random((200, 3, 2))
-    common = areas(overlaps(one, two))
-    assert common.min() > 0.1 and common == pytest.approx(areas(overlaps(two, one)), rel=1e-12)
-    owner, parts = without(one, two, np.zeros(200))
+    common = areas(intersect(one, two))
+    assert common.min() > 0.1 and common == pytest.approx(areas(intersect(two, one)), rel=1e-12)
+    owner, parts = subtract(one, two, np.zeros(200))
     assert np.bincount(owner, areas(parts), 200) + common == pytest.approx(areas(one))
-    assert not areas(overlaps(one, two + 9.0)).any()
+    assert not areas(intersect(one, two + 9.0)).any()
     places, weights = rule(3)
     x, y = places[:, 0], places[:, 1]
     # 2 a! b! / (a + b + 2)!
@@ -197,7 +197,7 @@ def test_only_what_is_nearest_counts(kinds, length):
     count = len(low.nodes.numbers)
     upper = replace(step.nodes, numbers=step.nodes.numbers + count)
     two = Side(
-        "both", joined_nodes([low.nodes, upper]), np.concatenate([low.facets, step.facets + count])
+        "both", join_nodes([low.nodes, upper]), np.concatenate([low.facets, step.facets + count])
     )
     one = face(kinds[0], (5, 4), up=False, height=0.5)
     found = DualMortar().match(one, two, 1.0)
@@ -221,7 +221,7 @@ def test_a_hidden_layer_of_the_same_outline_is_not_felt(kinds):
     behind = replace(far.nodes, numbers=far.nodes.numbers + count)
     two = Side(
         "both",
-        joined_nodes([near.nodes, behind]),
+        join_nodes([near.nodes, behind]),
         np.concatenate([near.facets, far.facets + count]),
     )
     one = face(kinds[0], (4, 4), up=False)

@@ -18,8 +18,8 @@ from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem
 from vi_contact.fem.body.assembly import assemble
-from vi_contact.fem.contact.faces import boundary
-from vi_contact.fem.contact.nodes import asked, slots_of
+from vi_contact.fem.contact.faces import gather_boundary
+from vi_contact.fem.contact.nodes import ask_alike, slots_of
 from vi_contact.fem.contact.surface import contact_surface, nodes_on
 from vi_contact.fem.mesh.communicators import MpiComm
 from vi_contact.fem.mesh.tagged_mesh import build_mesh
@@ -62,7 +62,7 @@ def test_numbers_alone_are_gathered():
     Friction and redistributed mass gather shared neighbours only."""
     system, tags = body()
     space, friction = system.space, Coulomb(0.3)
-    assert not len(boundary(space, tags["bottom"], beyond=0.5).vertices)
+    assert not len(gather_boundary(space, tags["bottom"], beyond=0.5).vertices)
     space.comm = system.algebra.comm = weighed = Weighed(COMM)
     surface = contact_surface(system, tags["bottom"])
     # up to two cuts, seen from both sides: number and box
@@ -103,14 +103,14 @@ def test_what_one_rank_refuses_all_refuse():
         return (2 * values,)
 
     with pytest.raises(InputError, match="^6 is too large"):
-        asked(MpiComm(COMM), slots, refuse, slots.copy())
+        ask_alike(MpiComm(COMM), slots, refuse, slots.copy())
 
     def all_or_none(values: Array) -> tuple[Any, ...]:
         if 0 not in values:
             raise InputError("the first is missing")
         return (2 * values,)
 
-    assert np.array_equal(asked(MpiComm(COMM), slots, all_or_none, slots.copy())[0], 2 * slots)
+    assert np.array_equal(ask_alike(MpiComm(COMM), slots, all_or_none, slots.copy())[0], 2 * slots)
 
 
 def test_obstacles_that_fail_at_one_place():

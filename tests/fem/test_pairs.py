@@ -342,8 +342,8 @@ def test_partners_are_looked_for_nearby():
         return plain(one, two, places, reach)
 
     with pytest.MonkeyPatch.context() as patch:
-        plain = matching._opposite
-        patch.setattr(matching, "_opposite", opposite)
+        plain = matching._find_opposite
+        patch.setattr(matching, "_find_opposite", opposite)
         for gap in (0.0, 0.01):
             other = side((x + gap * normals)[order], -normals[order])
             found = NodeToNode().match(side(x, normals), other, 2.0).P.indices

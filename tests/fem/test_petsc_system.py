@@ -98,7 +98,7 @@ def test_other_matrices_on_the_unknowns_of_a_body():
         system, tags["bottom"], obstacle=vc.HalfSpace((0.0, -1.0), (0.0, 1.0))
     )
     u = vc.static_equilibrium(vc.ContactProblem(system, surface)).u
-    stiff = PetscMatrix(system.space.reduced(system.space.forms.matrix("K")))
+    stiff = PetscMatrix(system.space.reduce(system.space.forms.matrix("K")))
     stiff.mat.scale(2.0)
     other = system.changed(K=stiff)
     assert vc.static_equilibrium(vc.ContactProblem(other, surface)).u == pytest.approx(

@@ -118,7 +118,7 @@ def test_fields_have_all_nodes_in_the_order_of_vtk(
 def of_reactions(problem: vc.ContactProblem, state: vc.State) -> Any:
     """The contact pressure of the reactions alone: zero where a node has no condition."""
     nodal = fields.nodal_contact(problem, state, np.ones(len(state.r_n)))[0]
-    return functions._function(problem, "contact_pressure", nodal[:, 0], state.t)
+    return functions._make_function(problem, "contact_pressure", nodal[:, 0], state.t)
 
 
 @pytest.mark.two_ranks

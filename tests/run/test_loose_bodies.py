@@ -14,6 +14,8 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from vi_contact import fem
+from vi_contact.core.algebra import SerialComm
+from vi_contact.core.surfaces import empty_surface
 from vi_contact.meshes import BlockMesh, TwoBlocks
 
 COMM = MPI.COMM_WORLD
@@ -66,3 +68,12 @@ def test_a_body_that_flies_is_warned_of(caplog: pytest.LogCaptureFixture) -> Non
         assert run(stacked(gap=0.1)).facts["status"] == "finished"
     if COMM.rank == 0:
         assert "no contact touches it: it moves freely" in caplog.text
+
+
+@pytest.mark.serial
+def test_a_free_mass_is_a_body_of_one_node(caplog: pytest.LogCaptureFixture) -> None:
+    """1 kg at the origin that a spring does not hold and that faces nothing."""
+    system = vc.system_from_arrays([1.0], None, [[0.0]], coordinates=[[0.0]])
+    with caplog.at_level(logging.WARNING):
+        list(vc.march(vc.ContactProblem(system, empty_surface(SerialComm(), 1)), dt=1e-3, steps=1))
+    assert "nothing holds the body of one node around" in caplog.text

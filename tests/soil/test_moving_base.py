@@ -3,6 +3,7 @@ seismic practice."""
 
 from __future__ import annotations
 
+import logging
 import math
 from typing import Any
 
@@ -64,6 +65,16 @@ def test_the_base_is_integrated_as_the_schemes_do():
         half = ground.at(0.5 * (t[7] + t[8]))[0][0]
         assert math.isclose(half, 0.5 * (u[7] + u[8]), rel_tol=1e-9)
         np.testing.assert_array_equal(ground.at(-1.0)[0], [0.0, 0.0])
+
+
+@pytest.mark.serial
+def test_the_mass_beside_the_run_is_not_warned_of(caplog: pytest.LogCaptureFixture):
+    """The user has not built it, and it is free so that it follows the ground."""
+    ground = base_motion(WAVES)
+    with caplog.at_level(logging.WARNING):
+        ground.path.bind(vc.Trapezoidal(), DT)
+        ground.at(3.0 * DT)
+    assert not caplog.records
 
 
 @pytest.mark.serial

@@ -19,7 +19,7 @@ from mpi4py import MPI
 from fem_problems import thrown_box
 import vi_contact as vc
 from vi_contact.fem.matrices import half
-from vi_contact.fem.mesh.communicators import give_back, kept
+from vi_contact.fem.mesh.communicators import give_back, keep_communicator
 
 half.COMPACT = 0
 for mu in (0.0, 0.3):
@@ -29,7 +29,7 @@ for mu in (0.0, 0.3):
         for _ in vc.march(problem, solver=solver, dt=1e-3, steps=2):
             pass
 del problem, solver, _
-give_back(kept(MPI.COMM_WORLD))
+give_back(keep_communicator(MPI.COMM_WORLD))
 """
 
 

@@ -13,7 +13,7 @@ import vi_contact as vc
 from vi_contact import fem
 from vi_contact.core.algebra import Array
 from vi_contact.core.step import Report
-from vi_contact.fem.output.fields import slipped
+from vi_contact.fem.output.fields import find_slipping
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
 
@@ -69,7 +69,7 @@ def rigid_motions(problem: vc.ContactProblem) -> Array:
 def status(report: Report) -> NDArray[Any]:
     """What each condition of all ranks does in a step: OPEN, STICKS or SLIPS, as all closed ones do
     if it is smooth."""
-    slides = slipped(report) if report.problem.frictional else True
+    slides = find_slipping(report) if report.problem.frictional else True
     return report.problem.surface.everywhere(
         np.where(report.new.active, np.where(slides, SLIPS, STICKS), OPEN)
     )

@@ -22,7 +22,7 @@ import vi_contact as vc
 from vi_contact import fem
 from vi_contact.core.algebra import Array
 from vi_contact.core.step import State
-from vi_contact.fem.output.fields import slipped
+from vi_contact.fem.output.fields import find_slipping
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import Blocks
 
@@ -170,7 +170,7 @@ def test_alike_in_any_orientation(ground, simplices):
                 problem.system.space.expand(problem.cartesian(state.u), state.t).reshape(-1, 3)
                 @ slope.turn
             )
-            status.append(np.where(state.active, np.where(slipped(report), 2, 1), 0))
+            status.append(np.where(state.active, np.where(find_slipping(report), 2, 1), 0))
         found.append((np.array(u), np.array(status)))
     (u, status), *others = found
     for turned, states in others:
@@ -199,7 +199,7 @@ def test_acceleration(ground):
     ):
         assert report.certificate.worst <= 1e-9
         v.append(slope.mean(state.v))
-        sticking.append((state.active & ~slipped(report)).sum())
+        sticking.append((state.active & ~find_slipping(report)).sum())
     exact = G * (tangent - mu) / np.hypot(1.0, tangent)
     found = np.diff(v, axis=0) @ slope.down / dt / exact
     assert sticking[0] > 8 and not any(sticking[30:]) and np.abs(found[:4]).max() < 0.15

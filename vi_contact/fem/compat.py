@@ -58,8 +58,12 @@ TOGETHER = (
 )
 
 
-def _compiling(comm: MPI.Comm, make: Callable[[], Any]) -> Any:
-    """Return make(), for which DOLFINx may have to compile.
+def _compile_by(comm: MPI.Comm, make: Callable[[], Any]) -> Any:
+    """Return make(), for which DOLFINx may have to compile. Collective.
+
+    Args:
+        comm: the ranks.
+        make: calls DOLFINx.
 
     Raises:
         InputError: on all ranks, where no C compiler works.
@@ -67,14 +71,14 @@ def _compiling(comm: MPI.Comm, make: Callable[[], Any]) -> Any:
     try:
         return make()
     except (RuntimeError, VerificationError) as error:
-        said = str(error)
-        if comm.size > 1 and said.startswith(TOGETHER):
-            said = comm.bcast(said)  # the first rank knows more
-        if not any(f"{kind}Error: " in said for kind in ("Compile", "Link")):
+        message = str(error)
+        if comm.size > 1 and message.startswith(TOGETHER):
+            message = comm.bcast(message)  # the first rank knows more
+        if not any(f"{kind}Error: " in message for kind in ("Compile", "Link")):
             raise
-        found = said.split("Error: ", 1)[1].strip().splitlines()[0]
+        cause = message.split("Error: ", 1)[1].strip().splitlines()[0]
         raise InputError(
-            f"DOLFINx cannot compile a finite element form ({found}): it needs a C compiler and "
+            f"DOLFINx cannot compile a finite element form ({cause}): it needs a C compiler and "
             "the headers of Python and of the C library; install them (Debian: gcc libc6-dev "
             "python3-dev), or name the compiler by the environment variable CC"
         ) from error
@@ -91,17 +95,22 @@ def create_mesh(
     x: npt.NDArray[np.float64],
     destinations: tuple[Indices, Indices],
 ) -> Mesh:
-    """Create a mesh of cells of first or second order, distributed as told.
+    """Create a mesh of cells of first or second order, with a given distribution. Collective.
 
-    `cell` is a UFL name ("interval", "triangle", "quadrilateral", "tetrahedron", "hexahedron").
-    `cells` (n_cells, n_nodes) holds rows of `x` in DOLFINx's order of vertices and mid-points, `x`
-    (n_points, gdim) the points [m], `destinations` the ranks each cell goes to, its owner first,
-    and the offsets of the cells in that list. A rank without input passes arrays of the right width
-    and no rows. Collective.
+    A rank without input passes arrays of the right width and no rows.
+
+    Args:
+        comm: the ranks.
+        cell: UFL's name of a cell: "interval", "triangle", "quadrilateral", "tetrahedron" or
+            "hexahedron".
+        cells: (n_cells, n_nodes) rows of ``x`` in DOLFINx's order of vertices and mid-points.
+        x: (n_points, gdim) the points [m].
+        destinations: the ranks each cell goes to, its owner first, and the offsets of the cells in
+            that list.
     """
 
     # the arguments of a partitioner changed twice, what it returns did not
-    def told(*_: Any) -> Any:
+    def partition(*_: Any) -> Any:
         return dolfinx.cpp.graph.AdjacencyList_int32(*destinations)
 
     gdim = x.shape[1]
@@ -110,14 +119,14 @@ def create_mesh(
         from basix.ufl import element
 
         domain = ufl.Mesh(element("Lagrange", cell, degree, shape=(gdim,)))
-        return _mesh.create_mesh(comm, cells=cells, x=x, e=domain, partitioner=told)
+        return _mesh.create_mesh(comm, cells=cells, x=x, e=domain, partitioner=partition)
     domain = ufl.Mesh(
         ufl.VectorElement("Lagrange", ufl.Cell(cell, geometric_dimension=gdim), degree)
     )
     # it tries an array first, and its error prints all arguments
     rows = dolfinx.cpp.graph.AdjacencyList_int64(cells)
     return _mesh.create_mesh(
-        comm, rows, x, domain, ghost_mode=GhostMode.shared_facet, partitioner=told
+        comm, rows, x, domain, ghost_mode=GhostMode.shared_facet, partitioner=partition
     )
 
 
@@ -138,18 +147,17 @@ def sub_entities(mesh: Mesh, dim: int) -> list[list[int]]:
 
 
 def gmsh_order(cell: str, nodes: int) -> Any:
-    """Return the places in Gmsh's row of a cell of the nodes in DOLFINx's order.
+    """Return where in Gmsh's row of a cell the nodes in DOLFINx's order are.
 
-    `cell` is a UFL name.
+    Args:
+        cell: UFL's name of the cell.
+        nodes: how many nodes it has.
     """
     return dolfinx.cpp.io.perm_gmsh(getattr(_mesh.CellType, cell), nodes)
 
 
 def vtk_order(mesh: Mesh, nodes: int) -> Any:
-    """Return the places in DOLFINx's row of a cell of the nodes in VTK's order.
-
-    It is that of XDMF.
-    """
+    """Return where in DOLFINx's row of a cell the nodes in the order of VTK and XDMF are."""
     return np.argsort(dolfinx.cpp.io.perm_vtk(mesh.topology.cell_type, nodes))
 
 
@@ -158,8 +166,9 @@ def mesh_bytes(mesh: Mesh) -> int:
     parts = [mesh.geometry.x, geometry_dofmap(mesh)]
     for pair in product(range(mesh.topology.dim + 1), repeat=2):
         with suppress(RuntimeError):  # from 0.6 on of what has not been made, which is None before
-            found = mesh.topology.connectivity(*pair)
-            parts += [] if found is None else [found.array, found.offsets]
+            links = mesh.topology.connectivity(*pair)
+            if links is not None:
+                parts += [links.array, links.offsets]
     return sum(part.nbytes for part in parts)
 
 
@@ -198,10 +207,7 @@ def tags_of(tags: Any, mesh: Mesh) -> bool:
 
 
 def _bare(wrapped: Any) -> Any:
-    """Return what DOLFINx's C++ part knows of an object of its Python part.
-
-    Other objects are returned as they are.
-    """
+    """Return the C++ object behind one of DOLFINx's Python part, and other objects as they are."""
     return getattr(wrapped, "_cpp_object", getattr(wrapped, "_mesh", wrapped))
 
 
@@ -212,8 +218,6 @@ def is_on(space: Any, mesh: Mesh) -> bool:
 
 def entities_where(mesh: Mesh, dim: int, marker: Callable[[Any], Any]) -> Indices:
     """Return the local cells, or facets of the boundary, whose vertices are all marked.
-
-    ``marker`` is x (3, n) -> (n,).
 
     Args:
         mesh: the mesh.
@@ -280,16 +284,17 @@ def lagrange(
         shape: () for numbers, (d,) for vectors, (n, n) for matrices.
         continuous: whether fields are.
     """
-    family = "Lagrange" if continuous else "DG" if _BASIX_ELEMENTS or is_simplex(mesh) else "DQ"
+    discontinuous = "DG" if _BASIX_ELEMENTS or is_simplex(mesh) else "DQ"
+    family = "Lagrange" if continuous else discontinuous
 
-    def made() -> Any:
+    def make() -> Any:
         if _BASIX_ELEMENTS:
             return fem.functionspace(mesh, (family, degree, shape) if shape else (family, degree))
         if len(shape) == 2:
             return fem.TensorFunctionSpace(mesh, (family, degree), shape=shape)
         return (fem.VectorFunctionSpace if shape else fem.FunctionSpace)(mesh, (family, degree))
 
-    return _compiling(mesh.comm, made)
+    return _compile_by(mesh.comm, make)
 
 
 def is_simplex(mesh: Mesh) -> bool:
@@ -300,10 +305,8 @@ def is_simplex(mesh: Mesh) -> bool:
 def dof_to_node(space: Any) -> Indices:
     """Return the local geometry node of each block of unknowns (owned, then ghosts), (n_blocks,).
 
-    Only of a space that has a node for every node of the mesh: P1 or Q1 on first-order, P2 or Q2 on
-    second-order cells.
-
-    Unknown c of block i (index bs*i + c) is component c at the point
+    This is for spaces whose nodes are those of the mesh: P1 or Q1 on first-order, P2 or Q2 on
+    second-order cells. Unknown c of block i (index bs*i + c) is component c at the point
     `mesh.geometry.x[dof_to_node(space)[i]]`.
     """
     index_map = space.dofmap.index_map
@@ -321,23 +324,24 @@ def cell_blocks(space: Any) -> Indices:
 
 
 def blocks_of_cells(space: Any) -> Indices:
-    """Return the same of the space of a ``dirichletbc``, of V or of V.sub(i).
+    """Return ``cell_blocks`` of the space of a ``dirichletbc``, which is V or V.sub(i).
 
-    The space is in C++ up to 0.11, in Python since.
+    The space is in C++ up to 0.11, in Python since. V.sub(i) has one unknown a node, with the
+    number that it has in V.
     """
     rows = getattr(space.dofmap, "map", None) or space.dofmap.list
     table = _as_table(rows() if callable(rows) else rows, space.dofmap.dof_layout)
-    return (
-        table
-        if space.dofmap.bs == space.dofmap.index_map_bs
-        else table // space.dofmap.index_map_bs
-    )
+    if space.dofmap.bs == space.dofmap.index_map_bs:
+        return table
+    return table // space.dofmap.index_map_bs
 
 
 def bc_values(bc: Any, count: int) -> tuple[Indices, npt.NDArray[np.float64]]:
-    """Return (local unknowns that a ``dirichletbc`` holds, ghosts too; their values).
+    """Return the local unknowns (k,) that a ``dirichletbc`` holds, ghosts too, and their values.
 
-    The space has so many unknowns.
+    Args:
+        bc: the condition.
+        count: how many local unknowns its space has.
     """
     values = np.zeros(count)
     bc.set(values, None, 1.0) if hasattr(bc, "set") else fem.set_bc(values, [bc])
@@ -346,9 +350,11 @@ def bc_values(bc: Any, count: int) -> tuple[Indices, npt.NDArray[np.float64]]:
 
 
 def _as_table(rows: Any, layout: Any) -> Indices:
-    """Return cell rows as a table: they are an AdjacencyList in 0.5, an array since.
+    """Return rows of cells as a table (cells, n): an AdjacencyList in 0.5, an array since.
 
-    A rank may have none.
+    Args:
+        rows: one of the two; a rank may have no cells.
+        layout: that of the unknowns of a cell, which knows n.
     """
     return rows if isinstance(rows, np.ndarray) else rows.array.reshape(-1, layout.num_dofs)
 
@@ -360,8 +366,12 @@ def _as_table(rows: Any, layout: Any) -> Indices:
 def compile_form(ufl_form: ufl.Form, degree: int | None = None) -> Any:
     """Generate, compile and load the code of a variational form. Collective.
 
-    The code is cached on disk by the form's signature. ``degree``: that of the integrals that do
-    not say their own; None leaves it to UFL's estimate.
+    The code is cached on disk by the form's signature.
+
+    Args:
+        ufl_form: the form.
+        degree: quadrature degree of the integrals that do not say their own; None leaves it to
+            UFL's estimate.
     """
     if degree is not None:
         integrals = [
@@ -372,7 +382,7 @@ def compile_form(ufl_form: ufl.Form, degree: int | None = None) -> Any:
         ]
         ufl_form = ufl.Form(integrals)
     comm = ufl_form.ufl_domain().ufl_cargo().comm
-    return _compiling(comm, lambda: fem.form(ufl_form))
+    return _compile_by(comm, lambda: fem.form(ufl_form))
 
 
 def assemble_matrix(form: Any) -> PETSc.Mat:
@@ -409,13 +419,10 @@ def cell_space(mesh: Mesh) -> Any:
 
 
 def expression(expr: Any, space: Any) -> Any:
-    """Make what ``Function.interpolate`` takes of an expression of UFL.
-
-    The points became a property in 0.10.
-    """
+    """Make what ``Function.interpolate`` takes of an expression of UFL, for a space."""
     points = space.element.interpolation_points
-    there = points() if callable(points) else points
-    return _compiling(space.mesh.comm, lambda: fem.Expression(expr, there))
+    places = points() if callable(points) else points  # a property since 0.10
+    return _compile_by(space.mesh.comm, lambda: fem.Expression(expr, places))
 
 
 def constant(mesh: Mesh, value: float) -> Any:
@@ -428,7 +435,7 @@ def function(space: Any) -> Any:
     return fem.Function(space)
 
 
-def facet_dofs(space: Any, facets: Indices) -> Indices:
+def locate_blocks(space: Any, facets: Indices) -> Indices:
     """Return the local blocks of unknowns on the facets. Collective.
 
     They are found on every rank that owns or ghosts them.
@@ -439,9 +446,9 @@ def facet_dofs(space: Any, facets: Indices) -> Indices:
     return fem.locate_dofs_topological(space, tdim - 1, np.asarray(facets, dtype=np.int32))
 
 
-def owned_facet_dofs(space: Any, facets: Indices) -> npt.NDArray[np.int64]:
+def locate_owned_blocks(space: Any, facets: Indices) -> npt.NDArray[np.int64]:
     """Return the owned blocks of unknowns on the facets, wherever these are owned. Collective."""
-    blocks = facet_dofs(space, facets)
+    blocks = locate_blocks(space, facets)
     return np.asarray(blocks[blocks < space.dofmap.index_map.size_local], dtype=np.int64)
 
 

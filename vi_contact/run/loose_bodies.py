@@ -102,9 +102,10 @@ def judge_loose_bodies(problem: ContactProblem) -> Iterator[tuple[str, bool]]:
     It is refused where its nodes lie at another's.
     """
     for body in find_loose_bodies(problem):
+        size = "one node" if body.nodes == 1 else f"{body.nodes} nodes"
         sentence = (
-            f"nothing holds the body of {body.nodes} nodes around {describe_point(body.middle)}, and no "
-            "contact touches it"
+            f"nothing holds the body of {size} around {describe_point(body.middle)}, and "
+            "no contact touches it"
         )
         if body.coinciding:
             yield (

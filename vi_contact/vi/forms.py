@@ -13,8 +13,8 @@ from ..core.errors import InputError
 from ..fem import compat
 from ..fem.body.form_checks import refuse_not_linear
 from ..fem.matrices.petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
-from ..fem.matrices.petsc_rows import moved
-from ..fem.mesh.communicators import MpiComm, kept
+from ..fem.matrices.petsc_rows import transfer
+from ..fem.mesh.communicators import MpiComm, keep_communicator
 from .rounding import OFF, measure_field
 
 KINDS = ("functional", "linear form", "bilinear form")
@@ -153,7 +153,7 @@ class Problem:
             F, J = differentiate(energy, u)
         space = u.function_space
         self.u = u
-        self.comm = MpiComm(kept(space.mesh.comm))
+        self.comm = MpiComm(keep_communicator(space.mesh.comm))
         self.owned = space.dofmap.index_map_bs * space.dofmap.index_map.size_local
         if not isinstance(bcs, list | tuple) or not all(compat.constrains(bc, space) for bc in bcs):
             raise make_error(
@@ -274,7 +274,7 @@ class Problem:
         gain = np.zeros(np.count_nonzero(self.free))
         if self._jacobian is None or left or not self.constant:
             self.close()
-            whole = moved(compat.assemble_matrix(self._J), self.comm.mpi)
+            whole = transfer(compat.assemble_matrix(self._J), self.comm.mpi)
             if left:
                 gain = (PetscMatrix(whole) @ (left * self.change[: self.owned]))[self.free]
             self._jacobian = as_petsc(

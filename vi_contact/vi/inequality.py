@@ -28,7 +28,7 @@ from ..core.collective import agree
 from ..core.errors import StepFailure
 from ..fem import compat
 from ..fem.body.form_checks import refuse_complex
-from ..fem.mesh.communicators import MpiComm, kept
+from ..fem.mesh.communicators import MpiComm, keep_communicator
 from ..solvers.volume.options import OptionLayers
 from ..solvers.volume.route import Method, TaoTron, Volume
 from .forms import Problem, make_error, take_common_part
@@ -152,7 +152,7 @@ def solve(
         "tolerance": tolerance,
         "iterations": iterations,
     }
-    agree(MpiComm(kept(u.function_space.mesh.comm)), "vi.solve", choices)
+    agree(MpiComm(keep_communicator(u.function_space.mesh.comm)), "vi.solve", choices)
     options = {} if petsc_options is None else petsc_options
     settings = Volume(method or TaoTron(), options, prefix, tolerance)
 

@@ -26,7 +26,7 @@ from vi_contact.core.state_checks import check_problem_given, check_sizes
 from vi_contact.core.step import State
 from vi_contact.core.system import Load, SemiDiscreteSystem
 from vi_contact.fem import compat
-from vi_contact.fem.body.space import FemSpace, known_matrices, space_of
+from vi_contact.fem.body.space import FemSpace, space_of, warn_of_other_matrices
 from vi_contact.fem.matrices.petsc_algebra import PetscMatrix
 
 
@@ -52,10 +52,10 @@ def geometric_stiffness(problem: ContactProblem, state: State) -> SemiDiscreteSy
     system = problem.system
     space = space_of("geometric_stiffness", problem.system)
     check_sizes("geometric_stiffness", problem, state)
-    known_matrices("geometric_stiffness", system, "K")
+    warn_of_other_matrices("geometric_stiffness", system, "K")
     u0 = problem.cartesian(state.u)
     full = initial_stress_matrix(space, space.expand(u0, state.t), state.t)
-    reduced = PetscMatrix(space.reduced(full))
+    reduced = PetscMatrix(space.reduce(full))
     load = replace(system.load, constant=system.load.constant + reduced @ u0)
     if any(condition.moves for condition in space.prescribed):
         load = _with_prescribed(space, PetscMatrix(full), load, state.t)
@@ -82,7 +82,7 @@ def initial_stress_matrix(space: FemSpace, nodal: Array, t: float = 0.0) -> Any:
     sigma = forms.stress(u0)
     forms.follow(u0, t)  # with the initial strains of this time
     form = ufl.inner(ufl.dot(ufl.grad(u), sigma), ufl.grad(v)) * ufl.dx
-    return compat.assemble_matrix(space.compiled(form))
+    return compat.assemble_matrix(space.compile_form(form))
 
 
 def _with_prescribed(space: FemSpace, full: PetscMatrix, load: Load, t0: float) -> Load:
@@ -90,9 +90,9 @@ def _with_prescribed(space: FemSpace, full: PetscMatrix, load: Load, t0: float) 
 
     It is -Pᵀ K_G (U(t) - U(t0)).
     """
-    start = space.prescribed_values(t0)
+    start = space.evaluate_prescribed(t0)
 
     def pull(t: float) -> Array:
-        return -space.pull(full @ (space.prescribed_values(t) - start))
+        return -space.pull(full @ (space.evaluate_prescribed(t) - start))
 
     return replace(load, general=(*load.general, pull))

@@ -1,17 +1,22 @@
-"""Assemble the semi-discrete system of a linear elastic body.
-
-It is M u'' + C u' + K u = f(t) (boundary method, eqs. 7-10a).
+"""Assemble the semi-discrete system M u'' + C u' + K u = f(t) of a linear elastic body.
 
     sigma = lambda_eff tr(eps) I + 2 mu eps,   M = ∫ rho u·v
     K = ∫ sigma(u):eps(v),   C = alpha M + beta K
 
-integrated over the mesh times the section's thickness. Prescribed displacements are eliminated: u =
-P u_free + U(t), so M, C, K are Pᵀ(·)P and the load gets -Pᵀ(K U + C U' + M U'').
+integrated over the mesh times the section's thickness (boundary method, eqs. 7-10a). Prescribed
+displacements are eliminated: u = P u_free + U(t), so M, C, K are Pᵀ(·)P and the load gets -Pᵀ(K U +
+C U' + M U'').
+
+The order of work: what is given is checked (``assembly_checks``, ``conditions``, ``dirichlet``);
+unknowns are numbered (``FemSpace``); forms, dashpots and loads are stated and assembled
+(``forms``, ``own_forms``, ``dashpots``, ``loads``); held and tied components are eliminated
+(``elimination``).
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 from typing import Annotated, Any
 
 import numpy as np
@@ -29,7 +34,7 @@ from ...laws.materials import Damping, Section
 from .. import compat
 from ..matrices.half import algebra_for
 from ..matrices.petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
-from ..matrices.petsc_rows import moved
+from ..matrices.petsc_rows import transfer
 from ..mesh.communicators import MpiComm, give_back
 from ..mesh.numbering import number_nodes
 from ..mesh.tagged_mesh import Cells, Facets
@@ -42,12 +47,12 @@ from .assembly_checks import (
 )
 from .conditions import as_tuple, gather_conditions
 from .dashpots import DashpotMatrix, Dashpots, describe_boundaries
-from .dirichlet import given_space, given_values, refuse_contradictions, refuse_uneven
+from .dirichlet import choose_space, read_values, refuse_contradictions, refuse_uneven
 from .elimination import Elimination
 from .forms import ElasticForms, Materials, cell_materials
 from .initial_strains import InitialStrain, InitialStrains
 from .linear_forms import AnyLoad, LinearForm, Loads
-from .loads import Prescribed, evaluate
+from .loads import Prescribed, Support, evaluate
 from .own_forms import Forms, OwnForms
 from .space import FemSpace, translations
 from .ties import Tied
@@ -155,7 +160,7 @@ def assemble(
     bcs = as_tuple(bcs)
     refuse_uneven(comm, bcs)
     if bcs or space is not None:
-        space, degree = given_space(mesh, space, bcs)
+        space, degree = choose_space(mesh, space, bcs)
     section, damping = check_body(
         mesh,
         material,
@@ -178,39 +183,40 @@ def assemble(
     check_nodes(comm, nodes, degree)
     if nodes.curved:
         refuse_folded(mesh)
-    blocks = [compat.owned_facet_dofs(V, one.facets.indices) for one in conditions.held]
-    supports = [
-        one.support(on_facets, mesh.geometry.dim)
-        for one, on_facets in zip(conditions.held, blocks, strict=True)
-    ]
+    supports = _make_supports(mesh, V, conditions.held)
     if bcs:
-        supports += [one.support(nodes.owned) for one in given_values(mesh, V, bcs)]
+        supports += [values.support(nodes.owned) for values in read_values(mesh, V, bcs)]
     space = FemSpace(
         V, nodes, supports, conditions.tied, degree=degree, quadrature_degree=quadrature_degree
     )
     if bcs:
         refuse_contradictions(space)
-    rigid = np.column_stack([space.restrict(one) for one in space.translations])
+    rigid = np.column_stack([space.restrict(motion) for motion in space.translations])
 
     # the body: weak forms of its materials or of the user, absorbing boundaries, loads
     materials = [] if material is None else cell_materials(mesh, material)
-    body = (
-        ElasticForms(space, materials, section, damping, selective=integration == "selective")
-        if forms is None
-        else OwnForms(space, forms, materials, section, damping)
-    )
+    if forms is None:
+        selective = integration == "selective"
+        body = ElasticForms(space, materials, section, damping, selective=selective)
+    else:
+        body = OwnForms(space, forms, materials, section, damping)
     body.boundaries = conditions.dashpots
     check_ratios(body, forms is None)
     algebra = algebra_for(space.comm.mpi, space.dimension, space.unknowns, symmetric=body.symmetric)
-    absorbers = [DashpotMatrix(space, body, one) for one in conditions.dashpots]
-    acting: list[Any] = [one.dashpots.loads(one, body) for one in absorbers]
+    absorbers = [DashpotMatrix(space, body, boundary) for boundary in conditions.dashpots]
+    acting: list[Any] = [absorber.dashpots.loads(absorber, body) for absorber in absorbers]
     load = assemble_loads(space, section, conditions.loads)
-    u0 = _initial(space, "initial displacement", initial_displacement)
-    v0 = _initial(space, "initial velocity", initial_velocity)
+    u0 = _evaluate_initial(space, "initial displacement", initial_displacement)
+    v0 = _evaluate_initial(space, "initial velocity", initial_velocity)
 
+    # the equations of the free unknowns, with the loads of prescribed motions and of boundaries
     reduced = _reduce(body, absorbers, algebra, base_inertia=base_inertia)
     M = reduced.M
     K = reduced.K
+    base_mass = None
+    if reduced.momenta is not None:
+        base_mass = reduced.momenta - np.column_stack([M @ r for r in rigid.T])
+    notes = body.notes if base_inertia else (*body.notes, LIGHTER)
     system = SemiDiscreteSystem(
         algebra=algebra,
         M=M,
@@ -219,34 +225,50 @@ def assemble(
         load=replace(
             load,
             inertial=reduced.inertial,
-            viscous=(*reduced.viscous, *(one for part in acting for one in part.viscous)),
+            viscous=(*reduced.viscous, *chain(*(boundary.viscous for boundary in acting))),
             general=(
                 *load.general,
                 *reduced.elastic,
-                *(one for part in acting for one in part.elastic),
+                *chain(*(boundary.elastic for boundary in acting)),
             ),
         ),
         influence=rigid,
-        base_mass=None
-        if reduced.momenta is None
-        else reduced.momenta - np.column_stack([M @ r for r in rigid.T]),
+        base_mass=base_mass,
         u0=u0,
         v0=v0,
         space=space,
         floating=floats(Unheld(algebra, M, K, rigid, space.bodies, space.coordinates)),
         tied=space.tied_unknowns,
-        absolute=any(one.lets_waves_in for one in conditions.dashpots),
-        notes=describe_boundaries(
-            conditions.dashpots, comm.rank, body.notes if base_inertia else (*body.notes, LIGHTER)
-        ),
+        absolute=any(boundary.lets_waves_in for boundary in conditions.dashpots),
+        notes=describe_boundaries(conditions.dashpots, comm.rank, notes),
         companions=tuple(
-            one for part in (*conditions.prescribed, *acting) for one in part.companions
+            chain(
+                *(condition.companions for condition in conditions.prescribed),
+                *(boundary.companions for boundary in acting),
+            )
         ),
     )
     body.own(system)
+
+    # matrices of all components are large: they go before anything else is made
     del absorbers, reduced
     give_back(mesh.comm)
     return system
+
+
+def _make_supports(mesh: Mesh, V: Any, held: Sequence[Prescribed]) -> list[Support]:
+    """Return what conditions hold of the owned blocks of a displacement's space. Collective.
+
+    Args:
+        mesh: that of the body.
+        V: the displacement's space.
+        held: what is clamped or prescribed.
+    """
+    blocks = [compat.locate_owned_blocks(V, condition.facets.indices) for condition in held]
+    return [
+        condition.support(on_facets, mesh.geometry.dim)
+        for condition, on_facets in zip(held, blocks, strict=True)
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,8 +276,12 @@ class _Reduced:
     """Hold the matrices of the free unknowns, and what held ones pull on them.
 
     Attributes:
-        M, C, K: mass, damping (None where nothing damps) and stiffness.
-        elastic, viscous, inertial: loads of prescribed motions U: -Pᵀ K U, -Pᵀ C U', -Pᵀ M U''.
+        M: mass.
+        C: damping, None where nothing damps.
+        K: stiffness.
+        elastic: loads t [s] -> (n,) [N] of prescribed motions U, -Pᵀ K U.
+        viscous: the like, -Pᵀ C U'.
+        inertial: the like, -Pᵀ M U''.
         momenta: (n, d) Pᵀ M of the unit translations of all nodes, None where nobody asks.
     """
 
@@ -287,24 +313,26 @@ def _reduce(
     elimination = space.elimination
     directions = translations(len(space.nodes), space.dimension)
     motions = [
-        partial(space.prescribed_values, derivative=k) if space.moves else None for k in range(3)
+        partial(space.evaluate_prescribed, derivative=k) if space.moves else None for k in range(3)
     ]
     # one after the other: each is large before it is reduced
     K, elastic = _eliminate(body.matrix("K"), elimination, algebra, motions[0])
     C: PetscMatrix | None = None
     viscous: tuple[Callable[[float], Array], ...] = ()
     if body.damped or absorbers:
-        C, viscous = _eliminate(_damper(body, absorbers), elimination, algebra, motions[1])
+        C, viscous = _eliminate(
+            _assemble_damping(body, absorbers), elimination, algebra, motions[1]
+        )
     mass = body.matrix("M")
     # momenta, less M r: what accelerated prescribed nodes pull on the free ones
     momenta = None
     if base_inertia:
-        momenta = np.column_stack([elimination.pull(PetscMatrix(mass) @ one) for one in directions])
+        momenta = np.column_stack([elimination.pull(PetscMatrix(mass) @ r) for r in directions])
     M, inertial = _eliminate(mass, elimination, algebra, motions[2])
     return _Reduced(M, C, K, elastic, viscous, inertial, momenta)
 
 
-def _damper(body: ElasticForms, absorbers: Sequence[DashpotMatrix]) -> Any:
+def _assemble_damping(body: ElasticForms, absorbers: Sequence[DashpotMatrix]) -> Any:
     """Return C of materials and absorbing boundaries, before elimination (PETSc)."""
     terms = [body.matrix("C")] if body.damped else []
     terms += [absorber.mat for absorber in absorbers]
@@ -328,14 +356,14 @@ def _eliminate(
         algebra: how the matrix is stored.
         motion: t -> U^(k)(t) (full,), None where nothing that is held moves.
     """
-    pull: tuple[Callable[[float], Array], ...] = ()
+    loads: tuple[Callable[[float], Array], ...] = ()
     # the columns of held components are kept for the load, before the full matrix goes
     if motion is not None:
-        matrix = PetscMatrix(moved(elimination.held_columns(full), algebra.comm.mpi))
-        pull = (lambda t: -elimination.pull(matrix @ motion(t)[elimination.held]),)
+        matrix = PetscMatrix(transfer(elimination.take_held_columns(full), algebra.comm.mpi))
+        loads = (lambda t: -elimination.pull(matrix @ motion(t)[elimination.held]),)
     part = elimination.reduce(full)
     full.destroy()
-    return algebra.held(moved(part, algebra.comm.mpi)), pull
+    return algebra.store(transfer(part, algebra.comm.mpi)), loads
 
 
 def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...]) -> Load:
@@ -349,11 +377,12 @@ def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...]) ->
     constant = np.zeros(len(space.ids))
     separable: list[tuple[Array, Callable[[float], float]]] = []
     general: list[Callable[[float], Array]] = []
-    if strained := [one for one in loads if isinstance(one, InitialStrain)]:
-        space.forms.initial = InitialStrains(space.forms, strained)
+    strains = [load for load in loads if isinstance(load, InitialStrain)]
+    if strains:
+        space.forms.initial = InitialStrains(space.forms, strains)
     # what changes with time by a factor alone is assembled once, what is constant is added up
     for load in loads:
-        force = _integrate(space, section, load)
+        force = _make_force(space, section, load)
         if load.history is not None:
             separable.append((force(0.0), load.history))
         elif load.is_constant:
@@ -363,10 +392,11 @@ def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...]) ->
     return Load(constant, tuple(separable), tuple(general))
 
 
-def _integrate(space: FemSpace, section: Section, load: AnyLoad) -> Callable[[float], Array]:
-    """Return t -> Pᵀ ∫ interpolated value · v [N], as one product with a matrix assembled here.
+def _make_force(space: FemSpace, section: Section, load: AnyLoad) -> Callable[[float], Array]:
+    """Return t [s] -> (n,) [N], the load on the free unknowns, less its history. Collective.
 
-    Of a linear form it is its own vector.
+    Of tractions and body forces it is Pᵀ ∫ interpolated value · v, one product with a matrix that
+    is assembled here; linear forms and initial strains assemble vectors of their own.
 
     Args:
         space: the body's unknowns.
@@ -382,7 +412,7 @@ def _integrate(space: FemSpace, section: Section, load: AnyLoad) -> Callable[[fl
     g = ufl.TrialFunction(space.V)
     v = ufl.TestFunction(space.V)
     form = ufl.inner(load.acting(g, space.mesh), v) * load.measure(space.mesh)
-    matrix = PetscMatrix(compat.assemble_matrix(space.compiled(form)))
+    matrix = PetscMatrix(compat.assemble_matrix(space.compile_form(form)))
     name = type(load).__name__
 
     def force(t: float) -> Array:
@@ -392,8 +422,8 @@ def _integrate(space: FemSpace, section: Section, load: AnyLoad) -> Callable[[fl
     return force
 
 
-def _initial(space: FemSpace, name: str, value: Initial) -> Array:
-    """Return initial values on the free unknowns. Collective.
+def _evaluate_initial(space: FemSpace, name: str, value: Initial) -> Array:
+    """Return initial values on the free unknowns (n,). Collective.
 
     Args:
         space: the body's unknowns.
@@ -403,7 +433,7 @@ def _initial(space: FemSpace, name: str, value: Initial) -> Array:
     if value is None:
         return np.zeros(len(space.ids))
     if not (isinstance(value, Sequence) and value and isinstance(value[0], tuple)):
-        return space.restrict(_nodal(space, name, value))
+        return space.restrict(_evaluate_nodal(space, name, value))
     pairs: Any = value
     values = np.zeros((len(space.nodes), space.dimension))
     for cells, field in pairs:
@@ -412,11 +442,11 @@ def _initial(space: FemSpace, name: str, value: Initial) -> Array:
         ghosts = space.node_of_block[blocks[blocks >= len(values)]]
         touched = np.isin(space.nodes, np.concatenate(from_each(space.comm, ghosts)))
         touched[blocks[blocks < len(values)]] = True
-        values[touched] = _nodal(space, name, field)[touched]
+        values[touched] = _evaluate_nodal(space, name, field)[touched]
     return space.restrict(values)
 
 
-def _nodal(space: FemSpace, name: str, value: Any) -> Array:
+def _evaluate_nodal(space: FemSpace, name: str, value: Any) -> Array:
     """Return the values (k, d) of a constant or a function of points at the owned nodes.
 
     Args:

@@ -1,6 +1,6 @@
-"""Check what a body is assembled of.
+"""Check what a body is assembled of: material or forms, section, damping, degree, initial values.
 
-These are kinds of objects, groups of this mesh, conditions that do not contradict.
+``conditions`` checks what holds, ties, damps and loads it.
 """
 
 import logging
@@ -28,7 +28,7 @@ from ...laws.materials import (
 )
 from .. import compat
 from ..mesh.communicators import MpiComm
-from ..mesh.group_checks import cells_of, field_given
+from ..mesh.group_checks import cells_of, check_field
 from ..mesh.numbering import NodeTable
 from .form_checks import refuse_complex
 from .forms import KINDS, ElasticForms
@@ -36,9 +36,8 @@ from .own_forms import Forms
 
 log = logging.getLogger(__name__)
 OWNER = "assemble"
-LOCKING = (
-    0.495  # Poisson's ratio; CHOSEN: 0.49 is common for wet soil, 0.499 is 10 % to 40 % too stiff
-)
+# Poisson's ratio; CHOSEN: 0.49 is common for wet soil, 0.499 is 10 % to 40 % too stiff
+LOCKING = 0.495
 
 
 def check_body(
@@ -86,23 +85,25 @@ def check_body(
         "give fem.Forms(stiffness=…, mass=…), or leave them out",
     )
     _check_material(mesh, material, forms)
+
+    # the usual for what is left out, then what goes with what
     if section is None:
         section = PlaneStrain() if mesh.geometry.dim == 2 else Solid()
-    damping = NoDamping() if damping is None else damping
+    if damping is None:
+        damping = NoDamping()
     _check_section(section, mesh.geometry.dim)
     _check_damping(damping, section, forms)
     flag(OWNER, "base_inertia", base_inertia)
-    found = (
-        [material]
-        if material is None or isinstance(material, KINDS)
-        else [one for _, one in material]
-    )
+    if material is None or isinstance(material, KINDS):
+        materials = [material]
+    else:
+        materials = [given for _, given in material]
     _check_integration(
-        mesh, found if forms is None else [forms], section, damping, degree, integration
+        mesh, materials if forms is None else [forms], section, damping, degree, integration
     )
     thick = mesh.geometry.dim > 1 and not isinstance(section, PlaneStress)
     if forms is None and degree == 1 and thick and integration == "full" and mesh.comm.rank == 0:
-        _tell_locking([one for one in found if isinstance(one, LinearElastic)])
+        _tell_locking([given for given in materials if isinstance(given, LinearElastic)])
     return section, damping
 
 
@@ -119,9 +120,9 @@ def _check_material(mesh: Any, material: Any, forms: Any) -> None:
     if material is not None and not isinstance(material, KINDS):
         remedy = "give a LinearElastic, Orthotropic or Heterogeneous, or (cells, material) pairs"
         for pair in several(OWNER, "material", material, remedy):
-            cells, one = _pair("material", pair, remedy)
+            cells, given = _read_pair("material", pair, remedy)
             cells_of(OWNER, "the cells of a material", cells, mesh)
-            instance(OWNER, "material", one, KINDS, remedy)
+            instance(OWNER, "material", given, KINDS, remedy)
 
 
 def _check_section(section: Any, dimension: int) -> None:
@@ -175,17 +176,17 @@ def _check_damping(damping: Any, section: Any, forms: Any) -> None:
 
 
 def check_ratios(body: ElasticForms, of_materials: bool) -> None:
-    """Raise InputError, on all ranks, for a damping law that damps nothing.
+    """Raise InputError, on all ranks, for a law that damps nothing, and for ratios no law reads.
 
-    So it does for damping ratios that no law reads.
-
-    body: the forms of a body, with its dashpots; of_materials: whether its stiffness and mass are
-    those of materials, and not the user's own forms.
+    Args:
+        body: the forms of a body, with its dashpots.
+        of_materials: whether its stiffness and mass are those of materials, and not the user's own
+            forms.
     """
     law = body.damping
     ratio = body.largest_ratio
     if isinstance(law, DampingRatio) and not any(
-        callable(one.xi) or one.xi for _, one in body.materials
+        callable(given.xi) or given.xi for _, given in body.materials
     ):
         raise InputError(
             f"assemble: {law} damps by the ratios xi of the materials, and none of them has one; "
@@ -211,7 +212,7 @@ def _refuse_ratio_behind(body: ElasticForms) -> None:
 
     They have no damping but their own.
     """
-    inside = [one for _, one in body.materials]
+    inside = [given for _, given in body.materials]
     for boundary in body.boundaries:
         behind = boundary.material
         if behind is not None and behind.xi and behind not in inside:
@@ -266,8 +267,8 @@ def refuse_folded(mesh: Mesh) -> None:
     size = ufl.TestFunction(compat.cell_space(mesh))
     det = ufl.JacobianDeterminant(mesh)
     signed, whole = (
-        compat.assemble_vector(compat.compile_form(one * size * ufl.dx)).array_r
-        for one in (det / abs(det), 1.0)
+        compat.assemble_vector(compat.compile_form(integrand * size * ufl.dx)).array_r
+        for integrand in (det / abs(det), 1.0)
     )
     folded = mesh.comm.allreduce(int(np.sum(np.abs(signed) < (1.0 - 1e-9) * whole)))
     if folded:
@@ -285,9 +286,7 @@ def _check_integration(
     degree: int,
     integration: Any,
 ) -> None:
-    """Raise InputError for a word of integration that is none.
-
-    So it does where cells cannot or need not be integrated selectively.
+    """Raise InputError for an unknown word, and where cells cannot or need not be "selective".
 
     Args:
         mesh: that of the body.
@@ -311,7 +310,7 @@ def _check_integration(
             "neither degree=2 nor plane stress locks; leave it out"
         )
     if any(getattr(damping, "viscosities", ())) or not all(
-        isinstance(one, LinearElastic) for one in materials
+        isinstance(material, LinearElastic) for material in materials
     ):
         raise InputError(
             "assemble: integration='selective' is for LinearElastic materials without KelvinVoigt "
@@ -321,7 +320,7 @@ def _check_integration(
 
 def _tell_locking(materials: Sequence[LinearElastic]) -> None:
     """Warn of materials that first-order cells cannot deform without changing their volume."""
-    stiff = max((one.nu for one in materials), default=0.0)
+    stiff = max((material.nu for material in materials), default=0.0)
     if stiff > LOCKING:
         log.warning(
             "Poisson's ratio %.10g locks first-order cells, so displacements are too small: give "
@@ -333,20 +332,21 @@ def _tell_locking(materials: Sequence[LinearElastic]) -> None:
 
 def check_initial(mesh: Mesh, **values: Any) -> None:
     """Raise InputError unless each is None, a field, or (cells, field) pairs of this mesh."""
-    for name, value in (
-        (f"initial_{name}", value) for name, value in values.items() if value is not None
-    ):
+    for rate, value in values.items():
+        if value is None:
+            continue
+        name = f"initial_{rate}"
         fields = [value]
         if isinstance(value, Sequence) and value and isinstance(value[0], tuple):
-            pairs = [_pair(name, pair, "give (cells, value) pairs") for pair in value]
+            pairs = [_read_pair(name, pair, "give (cells, value) pairs") for pair in value]
             fields = [field for _, field in pairs]
             for cells, _ in pairs:
                 cells_of(OWNER, f"the cells of {name}", cells, mesh)
         for field in fields:
-            field_given(OWNER, name, field)
+            check_field(OWNER, name, field)
 
 
-def _pair(name: str, pair: Any, remedy: str) -> tuple[Any, Any]:
+def _read_pair(name: str, pair: Any, remedy: str) -> tuple[Any, Any]:
     """Return both members of a pair.
 
     Args:
@@ -357,7 +357,7 @@ def _pair(name: str, pair: Any, remedy: str) -> tuple[Any, Any]:
     Raises:
         InputError: it has not two members.
     """
-    found = several(OWNER, f"a pair of {name}", pair, remedy)
-    if len(found) != 2:
-        raise InputError(f"{OWNER}: a pair of {name} has {len(found)} members; {remedy}")
-    return found[0], found[1]
+    members = several(OWNER, f"a pair of {name}", pair, remedy)
+    if len(members) != 2:
+        raise InputError(f"{OWNER}: a pair of {name} has {len(members)} members; {remedy}")
+    return members[0], members[1]

@@ -1,6 +1,7 @@
 """Gather what holds, ties, damps and loads a body, and check that it goes together.
 
-Groups are of this mesh and have facets, nothing acts twice, and conditions do not contradict.
+Groups must be of this mesh and have facets, nothing may act twice, and conditions may not
+contradict.
 """
 
 from collections.abc import Iterator, Sequence
@@ -89,41 +90,44 @@ def gather_conditions(
         )
         for item in given[name]:
             instance(OWNER, name, item, kinds, remedy)
-    groups = _groups(given)
+    groups = _list_groups(given)
     rest = [Prescribed(group) for group in given["clamped"] if isinstance(group, Facets)]
     for name, group in groups:
         meaning = name if name == "clamped" else f"the facets of {name}"
         facets_of(OWNER, meaning, group, mesh)
     _refuse_repeated(loads=given["loads"], dashpots=given["dashpots"])
     _refuse_empty(mesh, groups)
-    found = Conditions(
+    conditions = Conditions(
         held=(*rest, *given["prescribed"]),
         prescribed=given["prescribed"],
         tied=given["tied"],
         dashpots=given["dashpots"],
         loads=given["loads"],
     )
-    refuse(_contradictions(found.held, found.tied, found.dashpots), MpiComm(mesh.comm))
-    return found
+    refuse(
+        _find_contradictions(conditions.held, conditions.tied, conditions.dashpots),
+        MpiComm(mesh.comm),
+    )
+    return conditions
 
 
-def _groups(given: dict[str, tuple[Any, ...]]) -> list[tuple[str, Any]]:
+def _list_groups(given: dict[str, tuple[Any, ...]]) -> list[tuple[str, Any]]:
     """Return (name of the argument, group) of all boundary groups that arguments name."""
-    found = [("clamped", group) for group in given["clamped"]]
+    named = [("clamped", group) for group in given["clamped"]]
     for name in KINDS:
         for item in given[name]:
             groups = [getattr(item, side, None) for side in SIDES]
-            found += [(name, group) for group in groups if group is not None]
-    return found
+            named += [(name, group) for group in groups if group is not None]
+    return named
 
 
 def _refuse_repeated(**lists: Sequence[Any]) -> None:
     """Raise InputError for an object that a list names twice: it would act twice."""
     for name, items in lists.items():
-        for one, other in combinations(items, 2):
-            if one is other:
+        for first, second in combinations(items, 2):
+            if first is second:
                 raise InputError(
-                    f"assemble: {name} names one {type(one).__name__} twice, which would act "
+                    f"assemble: {name} names one {type(first).__name__} twice, which would act "
                     "twice; leave it out once, or give one of twice the size"
                 )
 
@@ -131,7 +135,11 @@ def _refuse_repeated(**lists: Sequence[Any]) -> None:
 def _refuse_empty(mesh: Mesh, groups: Sequence[tuple[str, Any]]) -> None:
     """Raise InputError, on all ranks, for a boundary group without facets on any rank.
 
-    It holds and loads nothing.
+    Such a group holds and loads nothing, which is seldom meant. Collective.
+
+    Args:
+        mesh: that of the body.
+        groups: (name of the argument, group) of all that are given.
     """
     own = np.array([len(group.indices) for _, group in groups], dtype=float)
     for (name, group), count in zip(groups, mesh.comm.allreduce(own), strict=True):
@@ -142,22 +150,23 @@ def _refuse_empty(mesh: Mesh, groups: Sequence[tuple[str, Any]]) -> None:
             )
 
 
-def _contradictions(
+def _find_contradictions(
     held: Sequence[Prescribed], tied: Sequence[Tied], damped: Sequence[Dashpots]
 ) -> Iterator[str]:
-    """Return pairs of conditions on the same facets of this rank that contradict.
+    """Yield a sentence on each pair of conditions that contradict on facets of this rank.
 
-    These are other values of one component, ties and dashpots.
+    Such are two values of one component, and dashpots on a boundary that is tied as a whole.
 
     Args:
         held: what is clamped or prescribed.
         tied: boundaries that move together.
         damped: absorbing boundaries.
     """
-    for one, two in combinations(held, 2):
-        if not one.same_motion(two) and len(np.intersect1d(one.facets.indices, two.facets.indices)):
+    for first, second in combinations(held, 2):
+        both = np.intersect1d(first.facets.indices, second.facets.indices)
+        if len(both) and not first.same_motion(second):
             yield (
-                f"assemble: boundary groups '{one.facets.name}' and '{two.facets.name}' share "
+                f"assemble: boundary groups '{first.facets.name}' and '{second.facets.name}' share "
                 "facets on which different displacements are prescribed: leave out one of the two"
             )
     sides = [side for tie in tied if tie.components is None for side in (tie.first, tie.second)]

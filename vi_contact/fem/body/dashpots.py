@@ -1,6 +1,4 @@
-"""Let the ground go on behind boundaries.
-
-There are dashpots that absorb waves, and a base that lets waves in from below.
+"""Let the ground go on behind boundaries: dashpots absorb waves, and a base lets waves in.
 
 Lysmer and Kuhlemeyer (1969), J. Eng. Mech. Div. ASCE 95, 859-877: on facets with outward normal n
 
@@ -45,8 +43,10 @@ NO_RESISTANCE = 1e-12  # of the resistance of all dashpots: a smaller share is n
 class BoundaryLoads:
     """Hold what a boundary puts on the body: functions t [s] -> (n,) [N] on the free unknowns.
 
-    ``elastic`` and ``viscous``: general and viscous parts of the load; ``companions``: motions
-    marched beside the run.
+    Attributes:
+        elastic: loads whose work is that of external forces.
+        viscous: loads that belong to the damping of the boundary (``Load.viscous``).
+        companions: motions marched beside the run, on which the loads depend.
     """
 
     elastic: tuple[Callable[[float], Array], ...] = ()
@@ -58,18 +58,20 @@ class BoundaryLoads:
 class Dashpots:
     """Put absorbing dashpots on facets.
 
-    ``material``: of the adjacent cells when None, or of the half-space behind.
-
-    ``normal``, ``tangential``: factors of rho c_P and rho c_S, to mistune or leave one out.
+    Args:
+        facets: a part of the outer boundary.
+        material: that of the half-space behind; of the adjacent cells when None.
+        normal: factor of rho c_P, to mistune or leave it out.
+        tangential: the like for rho c_S.
     """
 
     facets: Facets
     material: LinearElastic | None = None
     normal: Annotated[float, NotNegative] = 1.0
     tangential: Annotated[float, NotNegative] = 1.0
-    lets_waves_in: ClassVar[bool] = (
-        False  # the run's motion does not come in here; displacements would be of space
-    )
+    # no motion comes in here: where some does, displacements of a run are those in space, and no
+    # longer relative to the ground
+    lets_waves_in: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         owner = type(self).__name__
@@ -85,9 +87,11 @@ class Dashpots:
         check_fields(self)
 
     def loads(self, matrix: "DashpotMatrix", forms: Any) -> BoundaryLoads:
-        """Return what acts on the body here besides the dashpots: nothing.
+        """Return what acts on the body here besides the dashpots: nothing. Collective.
 
-        ``forms``: ``ElasticForms``. Collective.
+        Args:
+            matrix: that of these dashpots.
+            forms: the ElasticForms of the body.
         """
         return BoundaryLoads()
 
@@ -99,9 +103,10 @@ class Dashpots:
 
 @dataclass(frozen=True, kw_only=True)
 class CompliantBase(Dashpots):
-    """Put dashpots and an upgoing wave ``motion`` on a boundary.
+    """Put dashpots and an upgoing wave on a boundary.
 
-    It is t [s] -> v_up (d,) [m/s], half the outcrop's (``upgoing``).
+    Args:
+        motion: t [s] -> v_up (d,) [m/s], half the velocity of an outcrop (``upgoing``).
     """
 
     motion: Callable[[float], Array] = field(repr=False)
@@ -118,7 +123,7 @@ class CompliantBase(Dashpots):
 
     def loads(self, matrix: "DashpotMatrix", forms: Any) -> BoundaryLoads:
         """Return the load of the upgoing wave, 2 Pᵀ D v_up."""
-        load = matrix.moved_by(self.motion, 2.0)
+        load = matrix.make_load(self.motion, 2.0)
         load(0.0)  # a motion of other components is refused before any work
         return BoundaryLoads(viscous=(load,))
 
@@ -132,13 +137,28 @@ class CompliantBase(Dashpots):
 
 
 class DashpotMatrix:
-    """Assemble the full matrix D of some dashpots (PETSc), with n·D v the force that resists them.
+    """Assemble the matrix D of some dashpots: D v are the nodal forces against a velocity v.
 
-    InputError for facets that are not on the outer boundary, or prescribed in a direction that the
-    dashpots resist.
+        vᵀD w = ∫ (z_P (v·n)(w·n) + z_S (v·w - (v·n)(w·n))) ds
+
+    with the impedances z_P = normal rho c_P and z_S = tangential rho c_S times the thickness.
+
+    Attributes:
+        mat: D of all components, before elimination (PETSc).
     """
 
     def __init__(self, space: FemSpace, forms: Any, dashpots: Dashpots) -> None:
+        """Assemble D. Collective.
+
+        Args:
+            space: the body's unknowns.
+            forms: its ElasticForms.
+            dashpots: the boundary.
+
+        Raises:
+            InputError: no material to take wave speeds from, facets that are not on the outer
+                boundary, or prescribed in a direction that the dashpots resist.
+        """
         self.space = space
         self.dashpots = dashpots
         own = dashpots.material is not None
@@ -148,35 +168,42 @@ class DashpotMatrix:
                 f"have none: give {type(dashpots).__name__}(…, material=), or a material beside "
                 "the forms"
             )
-        cells = compat.cell_space(space.mesh) if own else forms.fields["rho"].function_space
-        # times thickness
-        moduli = (0.0 if own else forms.fields[name].x.array for name in ("lame", "shear", "rho"))
+        # impedances as functions on the cells: of their constants, which carry the thickness, or
+        # everywhere those of the material behind
+        if own:
+            cells = compat.cell_space(space.mesh)
+            moduli = [0.0, 0.0, 0.0]
+        else:
+            cells = forms.fields["rho"].function_space
+            moduli = [forms.fields[name].x.array for name in ("lame", "shear", "rho")]
         cellwise = []
         for values in impedances(dashpots, forms.section, *moduli):
-            cellwise.append(compat.function(cells))
-            cellwise[-1].x.array[:] = values
+            impedance = compat.function(cells)
+            impedance.x.array[:] = values
+            cellwise.append(impedance)
         self._normal, self._tangential = cellwise
-        self.mat = self._matrix(dashpots.facets.indices)
+        self.mat = self._assemble(dashpots.facets.indices)
         self._refuse_held()
 
-    def _matrix(self, facets: Any) -> Any:
-        """Assemble D over some facets."""
+    def _assemble(self, facets: Any) -> Any:
+        """Assemble D over some local facets. Collective."""
         u = ufl.TrialFunction(self.space.V)
         v = ufl.TestFunction(self.space.V)
         n = ufl.FacetNormal(self.space.mesh)
         along = ufl.dot(u, n) * ufl.dot(v, n)
         density = self._normal * along + self._tangential * (ufl.inner(u, v) - along)
         measure = compat.measure(self.space.mesh, self.space.mesh.topology.dim - 1, facets)
-        return compat.assemble_matrix(self.space.compiled(density * measure))
+        return compat.assemble_matrix(self.space.compile_form(density * measure))
 
-    def _resistance(self, mat: Any) -> Array:
-        """Return ∫ e_c·D e_c of every direction c, on all ranks."""
+    def _sum_resistance(self, mat: Any) -> Array:
+        """Return e_cᵀD e_c (d,) of the unit translation in every direction c. Collective."""
         whole = PetscMatrix(mat)
         return self.space.comm.sum(np.array([e @ (whole @ e) for e in self.space.translations]))
 
     def _refuse_held(self) -> None:
+        """Raise InputError where D resists nothing, or a motion that is prescribed. Collective."""
         name = self.dashpots.facets.name
-        total = self._resistance(self.mat).sum()
+        total = self._sum_resistance(self.mat).sum()
         if np.isnan(total):
             raise InputError(
                 f"dashpots on '{name}' stand beside orthotropic cells, whose waves have several "
@@ -187,11 +214,12 @@ class DashpotMatrix:
                 f"dashpots on '{name}' resist nothing: choose facets of the outer boundary and a "
                 "positive factor"
             )
+        # on facets that a condition holds in some components, D must not resist these
         for condition in self.space.prescribed:
             for both, held in condition.on_facets(self.space, self.dashpots.facets.indices):
                 if not largest(self.space.comm, len(both)):
                     continue
-                resisted = self._resistance(self._matrix(both)) > NO_RESISTANCE * total
+                resisted = self._sum_resistance(self._assemble(both)) > NO_RESISTANCE * total
                 if any(resisted[c] for c in held):
                     raise InputError(
                         f"boundary '{name}' has dashpots in a direction that is prescribed on "
@@ -199,8 +227,16 @@ class DashpotMatrix:
                         "out one of the two"
                     )
 
-    def moved_by(self, motion: Callable[[float], Array], factor: float) -> Callable[[float], Array]:
-        """Return the load factor Pᵀ D v(t), v the same at all nodes."""
+    def make_load(
+        self, motion: Callable[[float], Array], factor: float
+    ) -> Callable[[float], Array]:
+        """Return the load t -> factor Pᵀ D v(t) [N] on the free unknowns. Collective.
+
+        Args:
+            motion: t [s] -> v (d,) [m/s], the same at all nodes.
+            factor: 2 of an upgoing wave, which the boundary throws back.
+        """
+        # v is a sum of unit translations, so that D is multiplied once and not at every time
         whole = PetscMatrix(self.mat)
         rows = [self.space.pull(whole @ e) for e in self.space.translations]
         columns = factor * np.column_stack(rows)
@@ -220,10 +256,11 @@ class DashpotMatrix:
 def impedances(
     dashpots: Dashpots, section: Section, lame: Any, shear: Any, rho: Any
 ) -> tuple[Any, Any]:
-    """Return thickness · (normal rho c_P, tangential rho c_S).
+    """Return the impedances normal rho c_P and tangential rho c_S, times the thickness [Pa s].
 
-    They are those of the ground beside the dashpots, whose constants given here hold the thickness
-    already, or of their own material.
+        rho c_P = sqrt((lambda + 2 mu) rho),   rho c_S = sqrt(mu rho)
+
+    They are those of the dashpots' own material or, where they have none, of the ground beside.
 
     Args:
         dashpots: the absorbing boundary.
@@ -232,29 +269,31 @@ def impedances(
         shear: the shear modulus, times the thickness [Pa m].
         rho: the density, times the thickness [kg/m²].
     """
+    # the thickness is a factor of both constants under the root, and so of the root
     if dashpots.material is not None:
         rho = section.thickness * dashpots.material.rho
         lame, shear = (
             section.thickness * value for value in section.elastic_constants(dashpots.material)
         )
-    return dashpots.normal * np.sqrt((lame + 2.0 * shear) * rho), dashpots.tangential * np.sqrt(
-        shear * rho
-    )
+    normal = dashpots.normal * np.sqrt((lame + 2.0 * shear) * rho)
+    return normal, dashpots.tangential * np.sqrt(shear * rho)
 
 
 def describe_boundaries(
     boundaries: Sequence[Dashpots], rank: int, notes: tuple[str, ...] = ()
 ) -> tuple[str, ...]:
-    """Return these notes and what each boundary expects, logged on rank 0.
+    """Return these notes, and which motion each boundary expects; rank 0 logs them.
 
     Args:
         boundaries: absorbing boundaries.
         rank: this one's.
-        notes: what comes first.
+        notes: sentences that come first.
     """
     notes += tuple(
-        f"{type(one).__name__} on '{one.facets.name}' {one.expects}" for one in boundaries
+        f"{type(boundary).__name__} on '{boundary.facets.name}' {boundary.expects}"
+        for boundary in boundaries
     )
-    for note in notes if rank == 0 else ():
-        log.info("%s", note)
+    if rank == 0:
+        for note in notes:
+            log.info("%s", note)
     return notes

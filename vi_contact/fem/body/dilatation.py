@@ -1,6 +1,4 @@
-"""Take the volumetric strain of every cell as its mean.
-
-So first-order quadrilaterals and hexahedra do not lock.
+"""Take the volumetric strain of a cell as its mean, so that first-order cells do not lock.
 
     K = ∫ 2 mu eps(u):eps(v) + sum over cells of  lambda / |cell| ∫ tr eps(u) ∫ tr eps(v)
 
@@ -29,6 +27,7 @@ class MeanDilatation:
     """
 
     def __init__(self, V: Any) -> None:
+        """Assemble ∫ tr eps(phi_j) over every cell, and the volumes of the cells."""
         self._cells = compat.cell_space(V.mesh)
         q = ufl.TestFunction(self._cells)
         u = ufl.TrialFunction(V)
@@ -43,12 +42,15 @@ class MeanDilatation:
     def add(self, matrix: Any, *moduli: Any) -> None:
         """Add sum of modulus / |cell| ∫ tr eps(u) ∫ tr eps(v) to a PETSc matrix.
 
-        The matrix is of all unknowns; the modulus [Pa] is the product of cellwise Functions, None
-        for 1.
+        Args:
+            matrix: of all components; it is added to.
+            *moduli: cellwise Functions whose product is the modulus [Pa], None for 1.
         """
+        # Bᵀ diag(modulus / |cell|) B with B_cj = ∫ tr eps(phi_j) over cell c
         density = 1.0 / self._volume
-        for modulus in (one for one in moduli if one is not None):
-            density = density * modulus.x.array[: len(density)]
+        for modulus in moduli:
+            if modulus is not None:
+                density = density * modulus.x.array[: len(density)]
         every = np.arange(len(density))
         algebra = PetscAlgebra(self._cells.mesh.comm)
         weights = as_petsc(algebra.local(every, every, density, len(density))).mat
@@ -56,7 +58,7 @@ class MeanDilatation:
         matrix.axpy(1.0, triple_product(weights, self._integral.mat), structure=different)
 
     def of(self, u: Any) -> Any:
-        """Return the cellwise mean of tr eps of a Function; ``update`` follows its values."""
+        """Return the mean of tr eps of a Function on cells; ``update`` follows its values."""
         mean = compat.function(self._cells)
         self._means.append((u, mean))
         self.update(u)
@@ -64,7 +66,10 @@ class MeanDilatation:
 
     def update(self, u: Any) -> None:
         """Compute the means of this Function anew. Collective."""
-        for mean in (mean for function, mean in self._means if function is u):
-            values = self._integral @ np.asarray(u.x.array[: self._integral.mat.getLocalSize()[1]])
+        owned = self._integral.mat.getLocalSize()[1]
+        for function, mean in self._means:
+            if function is not u:
+                continue
+            values = self._integral @ np.asarray(u.x.array[:owned])
             mean.x.array[: len(values)] = values / self._volume
             mean.x.scatter_forward()

@@ -1,6 +1,11 @@
-"""Take Dirichlet data as a user of DOLFINx has them.
+"""Take Dirichlet data as a user of DOLFINx has them: ``dirichletbc`` objects.
 
-They are ``dirichletbc`` objects on the displacement's space, or parts.
+They are on the displacement's space V, on a space like it, or on a component V.sub(i). Such a space
+may number its unknowns in another order than V, and a component of it knows nothing of the others.
+So each is translated, once, into a table of V: which components of which nodes it holds, and at
+which values (``GivenValues``). From there on it is a support like ``fem.Prescribed``.
+
+A *block* is the d unknowns of one node; blocks are numbered on each rank, owned ones first.
 """
 
 from collections.abc import Sequence
@@ -28,8 +33,10 @@ REMEDY = (
 class GivenValues:
     """Hold components of nodes at the values of a ``dirichletbc``, as they were when given.
 
+    It answers what ``loads.Support`` asks of a condition: ``name``, ``at``, ``on_facets``.
+
     Attributes:
-        name: what messages call it.
+        name: what messages call it, such as "bcs[0]".
         mask: (blocks, d) which components of local blocks of V are held, ghosts too.
         values: (blocks, d) their values [m], zero elsewhere.
         moves: whether some value, of any rank, is not zero.
@@ -41,9 +48,10 @@ class GivenValues:
     moves: bool
 
     def support(self, owned: int) -> Support:
-        """Return what is held of a displacement space.
+        """Return what this rank holds.
 
-        ``owned``: how many blocks of unknowns this rank owns.
+        Args:
+            owned: how many blocks of V this rank owns.
         """
         blocks, components = np.nonzero(self.mask[:owned])
         return Support(self, (blocks, components), self.moves)
@@ -51,7 +59,7 @@ class GivenValues:
     def at(
         self, points: Array, places: tuple[Any, Any], t: float, derivative: int
     ) -> tuple[Any, str]:
-        """Return (the values, or zero rates, at the places; no defect).
+        """Return the values at the places, and no defect: zero for rates, as they do not move.
 
         Args:
             points: (owned nodes, d) coordinates [m]; nothing here needs them.
@@ -77,8 +85,10 @@ def refuse_uneven(comm: MpiComm, bcs: Sequence[Any]) -> None:
         )
 
 
-def given_space(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[Any, int]:
-    """Return (the user's space, or that of the conditions without one; its degree). Collective.
+def choose_space(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[Any, int]:
+    """Return the displacement's space and its degree, 1 or 2. Collective.
+
+    It is the user's, or else one that the first condition is on.
 
     Args:
         mesh: that of the body.
@@ -93,11 +103,11 @@ def given_space(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[Any, int]:
         if not compat.is_on(bc.function_space, mesh):
             raise InputError(f"assemble: a dirichletbc of bcs is on another mesh; {REMEDY}")
     if V is None:
-        # the space of the conditions is known by its blocks: try both degrees
-        for k in (1, 2):
-            known = compat.vector_space(mesh, k)
-            if _block_of(known, bcs[0].function_space) is not None:
-                return known, k
+        # a condition does not tell the degree of its space; the blocks of the right one fit
+        for degree in (1, 2):
+            known = compat.vector_space(mesh, degree)
+            if _match_blocks(known, bcs[0].function_space) is not None:
+                return known, degree
         raise InputError(f"assemble: a dirichletbc of bcs is on a space of another kind; {REMEDY}")
     provides(
         "assemble",
@@ -109,22 +119,19 @@ def given_space(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[Any, int]:
     if not compat.is_on(V, mesh):
         raise InputError("assemble: space is on another mesh; give a space on this one")
     # the displacement's space has the element of degree 1 or 2, and is no part of another space
-    for k in (1, 2):
-        known = compat.vector_space(mesh, k)
-        if (
-            V.ufl_element() == known.ufl_element()
-            and _block_of(known, V) is not None
-            and not len(V.component())
-        ):
-            return V, k
+    for degree in (1, 2):
+        known = compat.vector_space(mesh, degree)
+        alike = V.ufl_element() == known.ufl_element()
+        if alike and _match_blocks(known, V) is not None and not len(V.component()):
+            return V, degree
     raise InputError(
         f"assemble: space is one of {V.ufl_element()}; give the Lagrange space of degree 1 or 2 "
         f"with {mesh.geometry.dim} components, not a part of another space"
     )
 
 
-def given_values(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[GivenValues, ...]:
-    """Return what conditions hold of a displacement's space. Collective.
+def read_values(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[GivenValues, ...]:
+    """Translate conditions into tables of a displacement's space. Collective.
 
     Args:
         mesh: that of the body.
@@ -142,19 +149,20 @@ def given_values(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[GivenValues, ..
     conditions = []
     for k, bc in enumerate(bcs):
         name = f"bcs[{k}]"
-        block = _block_of(V, bc.function_space)
+        block = _match_blocks(V, bc.function_space)
         if block is None:
             raise InputError(
                 f"assemble: {name} is on another space than the displacement's; {REMEDY}"
             )
-        # from unknowns of the condition's space to blocks and components of V
+        # unknown i of the condition's space is component i % d of its block i // d: also where the
+        # space is a component of another one, whose numbers it keeps
         dofs, values = compat.bc_values(bc, d * len(block))
         known = block[dofs // d] >= 0
-        where = block[dofs[known] // d], dofs[known] % d
+        places = block[dofs[known] // d], dofs[known] % d
         mask = np.zeros(shape, dtype=bool)
         held = np.zeros(shape)
-        mask[where] = True
-        held[where] = values[known]
+        mask[places] = True
+        held[places] = values[known]
         finite = np.all(np.isfinite(values))
         refuse(
             ["" if finite else f"assemble: {name} has NaN or infinite values; correct them"], comm
@@ -170,36 +178,40 @@ def given_values(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[GivenValues, ..
 
 
 def refuse_contradictions(space: Any) -> None:
-    """Raise InputError, on all ranks, where conditions contradict. Collective.
+    """Raise InputError, on all ranks, where a dirichletbc and a ``Prescribed`` contradict.
 
-    A dirichletbc and a ``Prescribed`` then hold the same components of nodes, or one those of the
-    other and more, at different values, as every function of time may become. Conditions that only
-    meet do not contradict.
+    They do where one of them holds all components of nodes that the other one holds, at different
+    values; a function of time may become different. Conditions that only meet, as at the edge of
+    two boundaries, do not contradict: the later one counts. Collective.
+
+    Args:
+        space: the FemSpace of the body.
     """
-    given = np.array([isinstance(one, GivenValues) for one in space.prescribed], dtype=bool)
-    # the values that each holds at t = 0, NaN at the components that it does not hold
-    held = [np.full(space.held.shape, np.nan) for _ in given]
+    is_given = np.array([isinstance(each, GivenValues) for each in space.prescribed], dtype=bool)
+    # the values (k, d) that each holds at t = 0, NaN at the components that it does not hold
+    held = [np.full(space.held.shape, np.nan) for _ in is_given]
     for values, support in zip(held, space.supports, strict=True):
-        values[support.places] = support.at(space.points, 0.0, 0)[0]
-    for i, j in product(np.flatnonzero(~given), np.flatnonzero(given)):
+        values[support.places], _ = support.at(space.points, 0.0, 0)
+    for i, j in product(np.flatnonzero(~is_given), np.flatnonzero(is_given)):
         stated = space.prescribed[i]
         moves = stated.moves and callable(stated.displacement)
+        # NaN where one of them holds nothing
         apart = np.abs(held[i] - held[j])
-        # components that both hold, and all of each: one is a part of the other
-        both, *each = space.comm.sum(
-            np.array([np.isfinite(values).sum() for values in (apart, held[i], held[j])])
-        )
-        if both and both in each and (moves or largest(space.comm, np.nanmax(apart, initial=0.0))):
+        counts = np.array([np.isfinite(values).sum() for values in (apart, held[i], held[j])])
+        both, *each = space.comm.sum(counts)
+        contained = both and both in each
+        if contained and (moves or largest(space.comm, np.nanmax(apart, initial=0.0))):
             raise InputError(
                 f"assemble: {space.prescribed[j].name} and what is prescribed on "
                 f"'{stated.name}' differ at an unknown of both: leave one of them out"
             )
 
 
-def _block_of(V: Any, S: Any) -> Indices | None:
-    """Return the block of V that each block of a space is, -1 without cells. Collective.
+def _match_blocks(V: Any, S: Any) -> Indices | None:
+    """Return which block of V each block of a space is, -1 of those without cells. Collective.
 
-    Spaces made twice may be numbered differently.
+    Spaces made twice may be numbered differently; but a node has the same place in its cell in
+    both, so that the tables of their cells tell.
 
     Args:
         V: the displacement's space.
@@ -208,6 +220,7 @@ def _block_of(V: Any, S: Any) -> Indices | None:
     Returns:
         (blocks of S,), or None on all ranks where S is of another kind.
     """
+    # S has d unknowns a block or is one of d components, and as many nodes a cell as V
     d = V.mesh.geometry.dim
     theirs = S.dofmap.index_map
     mine = compat.cell_blocks(V)
@@ -219,7 +232,7 @@ def _block_of(V: Any, S: Any) -> Indices | None:
     )
     block = np.full(theirs.size_local + theirs.num_ghosts, -1, dtype=np.int64)
     if fits:
-        # a block has one place in every cell: the table of one space must follow from the other's
+        # written from all cells and read back: a block of S must be the same one of V in each
         block[rows] = mine
         fits = (
             np.array_equal(block[rows], mine)

@@ -45,7 +45,7 @@ class Elimination:
         """
         self.free = free
         self.held = held
-        self._P = None if followed is None else _selection(comm, free, followed, unknowns)
+        self._P = None if followed is None else _make_selection(comm, free, followed, unknowns)
 
     def restrict(self, full: Array) -> Array:
         """Restrict nodal values (owned nodes, d) to the free vector."""
@@ -72,14 +72,14 @@ class Elimination:
         """Return PᵀAP of a PETSc matrix of all components, a new one. Collective."""
         if self._P is not None:
             return triple_product(full, self._P.mat)
-        return _part(full, self.free, self.free)
+        return _take_part(full, self.free, self.free)
 
-    def held_columns(self, full: Any) -> Any:
-        """Return the columns of held components of a PETSc matrix of all. Collective."""
-        return _part(full, np.ones_like(self.free), self.held)
+    def take_held_columns(self, full: Any) -> Any:
+        """Return a matrix of all components with the columns of held ones only. Collective."""
+        return _take_part(full, np.ones_like(self.free), self.held)
 
 
-def _selection(comm: MpiComm, free: Mask, followed: Indices, unknowns: int) -> PetscMatrix:
+def _make_selection(comm: MpiComm, free: Mask, followed: Indices, unknowns: int) -> PetscMatrix:
     """Return P: one 1 per free component, and one for each that follows another. Collective.
 
     Args:
@@ -88,12 +88,14 @@ def _selection(comm: MpiComm, free: Mask, followed: Indices, unknowns: int) -> P
         followed: (full,) the unknown that each owned component is or follows, -1 where it is held.
         unknowns: how many there are on all ranks.
     """
-    kept = np.flatnonzero(followed >= 0)
-    ones = sp.csr_matrix((np.ones(len(kept)), (kept, followed[kept])), shape=(len(free), unknowns))
+    moving = np.flatnonzero(followed >= 0)
+    ones = sp.csr_matrix(
+        (np.ones(len(moving)), (moving, followed[moving])), shape=(len(free), unknowns)
+    )
     return PetscMatrix(aij_of(ones, comm.mpi, int(free.sum())))
 
 
-def _part(full: Any, rows: Mask, columns: Mask) -> Any:
+def _take_part(full: Any, rows: Mask, columns: Mask) -> Any:
     """Return the rows and columns of a PETSc matrix that masks of owned ones name. Collective.
 
     Args:

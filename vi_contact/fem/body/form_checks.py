@@ -1,6 +1,7 @@
 """Check the forms that a user gives for a body.
 
-They are functions, bilinear, of this mesh; matrices are finite, masses positive.
+They must be functions that return bilinear forms of its mesh, with finite matrices and a positive
+mass.
 """
 
 from collections.abc import Callable
@@ -21,7 +22,7 @@ from .. import compat
 from ..matrices.petsc_algebra import PetscMatrix
 from .space import FemSpace
 
-PROBES = 4
+PROBES = 4  # motions without a meaning whose kinetic energy is tried
 
 
 def refuse_complex(owner: str) -> None:
@@ -50,59 +51,66 @@ def takes(name: str, call: Any, *arguments: str) -> None:
         return
 
 
-def form_of(said: str, call: Callable[..., Any], space: FemSpace, *arguments: Any) -> Any:
+def form_of(owner: str, call: Callable[..., Any], space: FemSpace, *arguments: Any) -> Any:
     """Return call(*arguments), a form linear in all of them on the mesh of the space. Collective.
 
     Args:
-        said: the beginning of messages.
+        owner: who asks, the beginning of messages.
         call: the user's function that makes the form.
         space: that of the displacement.
         *arguments: what the form is linear in.
 
     Raises:
-        InputError: on all ranks otherwise; it begins with ``said``.
+        InputError: on all ranks otherwise; it begins with ``owner``.
     """
-    form = on_all(space.comm, said, lambda: call(*arguments))
+    form = on_all(space.comm, owner, lambda: call(*arguments))
     instance(
-        said,
+        owner,
         "what it returns",
         form,
         ufl.Form,
         "return an integral, such as ufl.inner(…, …) * ufl.dx",
     )
-    if set(on_all(space.comm, said, form.arguments)) != set(arguments):
+    if set(on_all(space.comm, owner, form.arguments)) != set(arguments):
         raise InputError(
-            f"{said} is not a form in the given trial and test functions; return one that is not "
+            f"{owner} is not a form in the given trial and test functions; return one that is not "
             "zero and is linear in each of them"
         )
-    on_all(space.comm, said, lambda: refuse_not_linear(said, form))
+    on_all(space.comm, owner, lambda: refuse_not_linear(owner, form))
     own = space.mesh.ufl_domain().ufl_id()
-    functions = (getattr(one, "function_space", space.V) for one in form.coefficients())
-    if any(one.ufl_id() != own for one in form.ufl_domains()) or any(
-        V.mesh is not space.mesh for V in functions
-    ):
+    spaces = [getattr(part, "function_space", space.V) for part in form.coefficients()]
+    elsewhere = any(domain.ufl_id() != own for domain in form.ufl_domains())
+    if elsewhere or any(V.mesh is not space.mesh for V in spaces):
         raise InputError(
-            f"{said} is of another mesh; give measures and Functions of the mesh of the body"
+            f"{owner} is of another mesh; give measures and Functions of the mesh of the body"
         )
-    if any(one.integral_type() == "interior_facet" for one in form.integrals()):
+    if any(integral.integral_type() == "interior_facet" for integral in form.integrals()):
+        # with ghosts of nodes alone no rank knows both cells of a facet between ranks
         maps = space.V.dofmap.index_map, space.mesh.topology.index_map(space.mesh.topology.dim)
-        nodes, cells = space.comm.sum(np.array([one.num_ghosts for one in maps]))
-        if nodes and not cells:  # no rank knows both cells of a facet between ranks
+        nodes, cells = space.comm.sum(np.array([local.num_ghosts for local in maps]))
+        if nodes and not cells:
             raise InputError(
-                f"{said} integrates over interior facets (dS), which on several ranks needs a mesh "
-                "with ghost_mode=shared_facet"
+                f"{owner} integrates over interior facets (dS), which on several ranks needs a "
+                "mesh with ghost_mode=shared_facet"
             )
     return form
 
 
-def refuse_not_linear(said: str, form: Any) -> None:
-    """Ask UFL here, on every rank: the compiler asks on one, and the others would wait for it."""
+def refuse_not_linear(owner: str, form: Any) -> None:
+    """Raise InputError unless UFL finds a form linear in its arguments.
+
+    It is asked here, on every rank: the compiler asks on one, and the others would wait for it.
+
+    Args:
+        owner: who asks, the beginning of messages.
+        form: the form.
+    """
     try:
         compute_form_data(form)
     except (ArityMismatch, TypeError, ValueError):
         # the first is no Exception; others where UFL words it and fails
         raise InputError(
-            f"{said} is not linear in u or in v; return a sum of products of one and the other"
+            f"{owner} is not linear in u or in v; return a sum of products of one and the other"
         ) from None
 
 
@@ -128,9 +136,10 @@ def is_symmetric(matrix: Any, space: FemSpace) -> bool:
 
 
 def refuse_masses(matrix: Any, space: FemSpace) -> None:
-    """Raise InputError unless a full mass matrix is symmetric and positive.
+    """Raise InputError unless a full mass matrix is symmetric and positive. Collective.
 
-    Its diagonal and some products tell.
+    Its diagonal tells, and the kinetic energies of translations and of ``PROBES`` other motions:
+    necessary conditions, for eigenvalues would cost more than the run.
     """
     M = PetscMatrix(matrix)
     if not is_symmetric(matrix, space):
@@ -148,7 +157,7 @@ def refuse_masses(matrix: Any, space: FemSpace) -> None:
 
 
 def _numbers(space: FemSpace) -> Any:
-    """Numbers of all owned components, prescribed ones too."""
+    """Return the numbers of all owned components on any ranks, prescribed ones too."""
     return (space.nodes[:, None] * space.dimension + np.arange(space.dimension)).ravel()
 
 
@@ -156,6 +165,10 @@ def refuse_stress(call: Callable[[Any], Any], space: FemSpace) -> None:
     """Raise InputError unless call(u) is a tensor of UFL, (d, d) or in the plane (3, 3).
 
     Collective.
+
+    Args:
+        call: the user's function.
+        space: that of the displacement.
     """
     d = space.dimension
     u = compat.function(space.V)

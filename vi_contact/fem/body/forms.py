@@ -4,6 +4,8 @@
     K = ∫ sigma(u):eps(v),   C = alpha M + beta K
 
 Orthotropic cells have sigma = C eps instead, KelvinVoigt damping adds its viscous stresses to C.
+All integrals are multiplied by the thickness of the section, which the cellwise constants carry as
+a factor. ``own_forms`` states a body by forms of the user's instead.
 """
 
 from collections.abc import Sequence
@@ -55,7 +57,9 @@ class ElasticForms:
 
     boundaries: tuple[Dashpots, ...] = ()  # of the same system
     initial: Any = None  # InitialStrains
-    densities = tells_stress = symmetric = True
+    densities = True
+    tells_stress = True
+    symmetric = True
     own_damping = False
     notes: tuple[str, ...] = ()
 
@@ -68,6 +72,16 @@ class ElasticForms:
         *,
         selective: bool = False,
     ) -> None:
+        """Fill the cellwise constants. Collective.
+
+        Args:
+            space: the body's unknowns.
+            materials: pairs of local cells and a material, which cover every cell once; none where
+                all forms are the user's own.
+            section: that of the body.
+            damping: the law of C.
+            selective: whether tr eps is taken as its mean over each cell.
+        """
         self.space = space
         self.section = section
         self.damping = damping
@@ -79,37 +93,40 @@ class ElasticForms:
         self._matrices: dict[str, WeakSet[Any]] = {name: WeakSet() for name in ("M", "C", "K")}
 
         # fields that are constant on cells, or linear in them where a material varies inside
-        degree = int(any(isinstance(one, Heterogeneous) and one.varies for _, one in materials))
+        degree = 0
+        if any(isinstance(given, Heterogeneous) and given.varies for _, given in materials):
+            degree = 1
         cells = compat.lagrange(space.mesh, degree, continuous=False)
         self.fields = {name: compat.function(cells) for name in FIELDS} if materials else {}
         table = compat.cell_blocks(cells)
         dofs = [table[where] for where, _ in materials]
-        values: list[Any] = [
-            one.at(cells, where) if isinstance(one, Heterogeneous) else _constants(one)
-            for where, one in materials
-        ]
+        values = [_evaluate(given, cells, where) for where, given in materials]
 
         # what the law of damping makes of them: a ratio may be zero in all cells of some ranks
         viscosities = getattr(damping, "viscosities", None)
         self.viscous = viscosities if viscosities and any(viscosities) else None  # [Pa s]
-        damped = self.viscous is not None or any(
-            np.any(one) for each in values for one in damping.coefficients(each)
-        )
+        damped = self.viscous is not None
+        for constants in values:
+            damped = damped or any(np.any(share) for share in damping.coefficients(constants))
         self.damped = bool(largest(space.comm, damped))
-        ratios = [_largest_ratio(one.xi, where) for one, where in zip(values, dofs, strict=True)]
+        ratios = [
+            _largest_ratio(constants.xi, where)
+            for constants, where in zip(values, dofs, strict=True)
+        ]
         self.largest_ratio = float(largest(space.comm, max(ratios, default=0.0)))
 
         # fill the fields, times the thickness
         if not self.damped and materials:
             self.fields["alpha_rho"] = self.fields["beta"]  # zeros
-        for where, one in zip(dofs, values, strict=True):
-            constants = _fields(one, section, damping, space.dimension)
-            for name, value in zip(FIELDS, constants, strict=True):
-                value = section.thickness * value if name != "beta" else value
+        for where, constants in zip(dofs, values, strict=True):
+            columns = _compute_fields(constants, section, damping, space.dimension)
+            for name, value in zip(FIELDS, columns, strict=True):
+                if name != "beta":
+                    value = section.thickness * value
                 self.fields[name].x.array[where] = value[where] if np.ndim(value) else value
         self._anisotropic: Any = None
-        if any(isinstance(one, Orthotropic) for _, one in materials):
-            self._anisotropic = _anisotropic(
+        if any(isinstance(given, Orthotropic) for _, given in materials):
+            self._anisotropic = _make_anisotropic(
                 cells, degree, materials, self.fields, section, space.dimension
             )
 
@@ -119,36 +136,34 @@ class ElasticForms:
         return np.asarray(field.x.array[compat.cell_blocks(field.function_space)].mean(axis=1))
 
     def own(self, system: SemiDiscreteSystem) -> None:
-        """Remember the matrices of a system as made of these materials.
-
-        The forms are then those of its space.
-        """
+        """Remember the matrices of a system as made of these forms, and give them to its space."""
         self.space.forms = self
         for name, known in self._matrices.items():
             if getattr(system, name) is not None:
                 known.add(getattr(system, name))
 
     def foreign(self, system: SemiDiscreteSystem, names: str) -> str:
-        """Return the letters of ``names`` whose matrices are not of these materials.
+        """Return the letters of ``names``, such as "MK", whose matrices are not of these forms.
 
-        The matrices of a system were not made of these.
+        The user has exchanged these matrices since ``assemble`` made the system.
         """
         return "".join(
             name for name in names if getattr(system, name) not in (None, *self._matrices[name])
         )
 
     def stress(self, u: Any) -> Any:
-        """Return sigma(u) (d, d) times the thickness, of a Function less that of initial strains.
+        """Return sigma(u) (d, d) [Pa] times the thickness.
 
-        With these, or with selective integration: ``follow`` when its values or the time have
-        changed since.
+        Of a Function, the stress of initial strains is taken off. With these, or with selective
+        integration, call ``follow`` when its values or the time have changed since.
         """
         return self.stresses(u)[0]
 
     def stresses(self, u: Any) -> tuple[Any, Any]:
-        """Return the stress and sigma_zz(u) times the thickness of a body in the plane.
+        """Return sigma(u) (d, d) and sigma_zz(u) [Pa] times the thickness.
 
-        sigma_zz = 0 in plane stress and else.
+        sigma_zz is that of plane strain; it is 0 in plane stress, and for bodies that are not in
+        the plane.
         """
         eps = ufl.sym(ufl.grad(u))
         trace = self._trace(u)
@@ -158,13 +173,17 @@ class ElasticForms:
         return self.hooke(eps - own, -across, trace - ufl.tr(own))
 
     def hooke(self, eps: Any, across: Any, trace: Any) -> tuple[Any, Any]:
-        """Return (sigma (d, d), sigma_zz) times the thickness of a strain.
+        """Return sigma (d, d) and sigma_zz [Pa] times the thickness of a strain, by Hooke's law.
 
-        Given are the strain, that across the plane, and its trace.
+            sigma = (lambda tr eps + lambda_out eps_zz) I + 2 mu eps
+            sigma_zz = lambda_out (tr eps + eps_zz) + 2 mu eps_zz
+
+        with lambda_out = lambda in plane strain, else 0; where some cell is orthotropic, sigma = C
+        eps in Voigt's order instead.
 
         Args:
             eps: (d, d) strain.
-            across: strain across the plane.
+            across: eps_zz, strain across the plane.
             trace: trace of the strain in the plane.
         """
         d = self.space.dimension
@@ -173,18 +192,22 @@ class ElasticForms:
             sigma = fields["lame"] * trace * ufl.Identity(d) + 2 * fields["shear"] * eps
             sigma += fields["lame_out"] * across * ufl.Identity(d)
             return sigma, fields["lame_out"] * (trace + across) + 2 * fields["shear"] * across
+        # C times the vector of strains in Voigt's order (shears doubled), the last across the plane
         place = {pair: k for k, pair in enumerate(VOIGT[d])}
-        strains = [eps[i, j] if i == j else 2 * eps[i, j] for i, j in place] + [across] * (d == 2)
+        strains = [eps[i, j] if i == j else 2 * eps[i, j] for i, j in place]
+        if d == 2:
+            strains.append(across)
         flat = ufl.dot(self._anisotropic, ufl.as_vector(strains))
-        sigma = ufl.as_tensor(
-            [[flat[place[min(i, j), max(i, j)]] for j in range(d)] for i in range(d)]
-        )
-        return sigma, flat[3] if d == 2 else 0.0 * trace
+        # back to a symmetric tensor, of which Voigt's order has the upper half
+        rows = []
+        for i in range(d):
+            rows.append([flat[place[min(i, j), max(i, j)]] for j in range(d)])
+        return ufl.as_tensor(rows), flat[3] if d == 2 else 0.0 * trace
 
     def _trace(self, u: Any) -> Any:
-        """Return tr eps or, of a Function, its mean over each cell.
+        """Return tr eps, with selective integration its mean over each cell.
 
-        There is none in bilinear forms where ``dilatation`` adds it.
+        In the bilinear form it is 0 then: ``dilatation`` adds the volumetric part to the matrix.
         """
         if self.dilatation is None:
             return ufl.tr(ufl.sym(ufl.grad(u)))
@@ -194,6 +217,10 @@ class ElasticForms:
         """Bring stresses of a Function up to its values, and initial strains up to a time.
 
         Collective.
+
+        Args:
+            u: the Function.
+            t: time [s], None to leave initial strains as they are.
         """
         if self.dilatation is not None:
             self.dilatation.update(u)
@@ -201,10 +228,7 @@ class ElasticForms:
             self.initial.follow(t)
 
     def bilinear(self, name: str) -> Any:
-        """Return the form of M, K, or C of the materials.
-
-        It is in the trial function ``u`` and the test function ``v``.
-        """
+        """Return the form of M, K, or C in the trial function ``u`` and the test function ``v``."""
         u = self.u
         v = self.v
         fields = self.fields
@@ -217,7 +241,7 @@ class ElasticForms:
         return form + self._viscous_form() if self.viscous else form
 
     def against(self, name: str, r: Any, inside: Any) -> Any:
-        """Return rᵀA of the cells inside, A = M, K or C, as a linear form.
+        """Return rᵀA of the cells inside, A = M, K or C, as a linear form in the test function.
 
         It is the bilinear form with r as test function. Call ``follow`` when the values of the
         Function r have changed since.
@@ -234,12 +258,12 @@ class ElasticForms:
         return form + inside * modulus * self.dilatation.of(r) * ufl.div(self.v) * ufl.dx
 
     def _viscous_form(self) -> Any:
-        """Return the form of the viscous stresses of KelvinVoigt."""
+        """Return ∫ (lambda' tr eps(u') I + 2 mu' eps(u')):eps(v) of KelvinVoigt's viscosities."""
         lame, shear = (
-            compat.constant(self.space.mesh, self.section.thickness * one)
-            for one in self.viscous or ()
+            compat.constant(self.space.mesh, self.section.thickness * viscosity)
+            for viscosity in self.viscous or ()
         )
-        rate, strain = (ufl.sym(ufl.grad(one)) for one in (self.u, self.v))
+        rate, strain = (ufl.sym(ufl.grad(function)) for function in (self.u, self.v))
         return (lame * ufl.tr(rate) * ufl.tr(strain) + 2 * shear * ufl.inner(rate, strain)) * ufl.dx
 
     def matrix(self, name: str) -> Any:
@@ -255,28 +279,42 @@ class ElasticForms:
 
 
 def cell_constants(space: Any, material: Materials) -> Array:
-    """Return E, nu, rho and xi of the local cells, (4, cells), NaN where Orthotropic has none; DG0.
+    """Return E [Pa], nu, rho [kg/m³] and xi of the local cells, (4, cells). Collective.
 
-    Collective.
+    E and nu are NaN in orthotropic cells.
+
+    Args:
+        space: that of functions which are constant on cells (DG0).
+        material: that of ``assemble``.
     """
     place = compat.cell_blocks(space)[:, 0]
-    found = np.empty((4, len(place)))
-    for where, one in cell_materials(space.mesh, material):
-        known = one.at(space, where) if isinstance(one, Heterogeneous) else _constants(one)
-        for row, value in zip(found, (known.E, known.nu, known.rho, known.xi), strict=True):
+    rows = np.empty((4, len(place)))
+    for where, given in cell_materials(space.mesh, material):
+        known = _evaluate(given, space, where)
+        for row, value in zip(rows, (known.E, known.nu, known.rho, known.xi), strict=True):
             row[where] = value[place[where]] if np.ndim(value) else value
-    return found
+    return rows
 
 
-def _constants(material: LinearElastic | Orthotropic) -> Any:
-    """Return the material, or values where it has no Lamé constants."""
+def _evaluate(material: Material, space: Any, cells: Any) -> Any:
+    """Return the constants of a material, numbers or values at all unknowns of a cellwise space.
+
+    Orthotropic materials have NaN for Lamé's constants. Collective.
+
+    Args:
+        material: the material.
+        space: the cellwise space.
+        cells: local cells of the material.
+    """
+    if isinstance(material, Heterogeneous):
+        return material.at(space, cells)
     if isinstance(material, Orthotropic):
         return ElasticValues(np.nan, np.nan, material.rho, material.xi)
     return material
 
 
 def _largest_ratio(xi: Any, dofs: Any) -> float:
-    """Return the largest damping ratio of a material.
+    """Return the largest damping ratio of a material on this rank.
 
     Args:
         xi: a number, or values at all unknowns of the cellwise space.
@@ -287,23 +325,28 @@ def _largest_ratio(xi: Any, dofs: Any) -> float:
     return float(xi) if len(dofs) else 0.0
 
 
-def _fields(one: Any, section: Section, damping: Damping, dimension: int) -> tuple[Any, ...]:
-    """Return lame, shear, rho, alpha rho, beta and lame_out of a material (``FIELDS``).
+def _compute_fields(
+    constants: Any, section: Section, damping: Damping, dimension: int
+) -> tuple[Any, ...]:
+    """Return lame, shear, rho, alpha rho, beta and lame_out of a material, in order of ``FIELDS``.
 
     Args:
-        one: the material, or values at all unknowns of the cellwise space.
+        constants: of the material, numbers or values at all unknowns of the cellwise space.
         section: that of the body.
         damping: the law of C.
         dimension: d.
     """
-    lame, shear = section.elastic_constants(one)
-    alpha, beta = damping.coefficients(one)
-    # sigma_zz = lambda tr(eps) in plane strain, 0 in plane stress: only von Mises stress needs it
-    lame_out = lame if np.array_equal(lame, one.lame_lambda) and dimension == 2 else 0.0
-    return lame, shear, one.rho, alpha * one.rho, beta, lame_out
+    lame, shear = section.elastic_constants(constants)
+    alpha, beta = damping.coefficients(constants)
+    # sigma_zz = lambda tr(eps) in plane strain, where the section leaves lambda as it is; it is 0
+    # in plane stress. Only von Mises stress and initial strains need it.
+    lame_out = 0.0
+    if dimension == 2 and np.array_equal(lame, constants.lame_lambda):
+        lame_out = lame
+    return lame, shear, constants.rho, alpha * constants.rho, beta, lame_out
 
 
-def _anisotropic(
+def _make_anisotropic(
     cells: Any,
     degree: int,
     materials: list[tuple[Any, Material]],
@@ -311,9 +354,10 @@ def _anisotropic(
     section: Section,
     d: int,
 ) -> Any:
-    """Return the matrix of all cells times the thickness, as a function.
+    """Return C in Voigt's order times the thickness, as a Function of matrices.
 
-    See ``Orthotropic.matrix``.
+    In the plane it has a row and a column more, of strain and stress across it. Isotropic cells
+    have C = lambda 1 1ᵀ + mu diag(2, …, 1, …); for others see ``Orthotropic.matrix``.
 
     Args:
         cells: the cellwise space.
@@ -329,16 +373,16 @@ def _anisotropic(
         )
     n = len(VOIGT[d])
     trace = np.array([float(i == j) for i, j in VOIGT[d]])
-    rows = n + (d == 2)  # the last one is that of the strain and the stress across the plane
-    found = compat.function(compat.lagrange(cells.mesh, degree, (rows, rows), continuous=False))
-    values = found.x.array.reshape(len(fields["lame"].x.array), rows, rows)
-    for where, one in materials:
+    rows = n + 1 if d == 2 else n
+    matrices = compat.function(compat.lagrange(cells.mesh, degree, (rows, rows), continuous=False))
+    values = matrices.x.array.reshape(len(fields["lame"].x.array), rows, rows)
+    for where, material in materials:
         dofs = np.ravel(compat.cell_blocks(cells)[where])
-        if isinstance(one, Orthotropic):
-            told = section.thickness * one.matrix(section, d)
-            corner = section.thickness * one.stiffness[2, 2, 2, 2]
-            whole = told[:n]
-            across = told[n:]
+        if isinstance(material, Orthotropic):
+            known = section.thickness * material.matrix(section, d)
+            corner = section.thickness * material.stiffness[2, 2, 2, 2]
+            whole = known[:n]
+            across = known[n:]
         else:
             lame, shear, out = (
                 fields[name].x.array[dofs][:, None, None] for name in ("lame", "shear", "lame_out")
@@ -350,7 +394,7 @@ def _anisotropic(
         values[dofs, n:, :n] = across
         values[dofs, :n, n:] = across.swapaxes(-1, -2)
         values[dofs, n:, n:] = corner
-    return found
+    return matrices
 
 
 def cell_materials(mesh: Any, material: Materials) -> list[tuple[Any, Material]]:
@@ -363,6 +407,7 @@ def cell_materials(mesh: Any, material: Materials) -> list[tuple[Any, Material]]
     count = cell_map.size_local + cell_map.num_ghosts
     if isinstance(material, KINDS):
         return [(np.arange(count), material)]
+    # how often each cell is named, and of each group how many cells are owned
     covered = np.zeros(count, dtype=np.int64)
     for cells, _ in material:
         covered[cells.indices] += 1
@@ -386,4 +431,4 @@ def cell_materials(mesh: Any, material: Materials) -> list[tuple[Any, Material]]
             f"{missing} cells have no material: give a (cells, material) pair for every cell group "
             "of the mesh"
         )
-    return [(cells.indices, one) for cells, one in material]
+    return [(cells.indices, given) for cells, given in material]

@@ -32,9 +32,7 @@ RANGES: dict[str, tuple[str, float, float, str]] = {
 
 @dataclass(frozen=True)
 class Heterogeneous:
-    """Describe isotropic elasticity with E(x) [Pa], nu(x) and rho(x) [kg/m³].
-
-    There is also xi(x), which DampingRatio damps by.
+    """Describe isotropic elasticity by functions E(x) [Pa], nu(x), rho(x) [kg/m³] and xi(x).
 
     Each is a number, a scalar DOLFINx Function on the mesh of the body, an expression of UFL there,
     or a function of points x (3, k) [m] that returns values (k,), as ``Function.interpolate`` takes
@@ -47,9 +45,16 @@ class Heterogeneous:
     body keeps the values of the moment when it is assembled. Columns of free fields and section
     forces through elements take means over cells.
 
-    Raises InputError: neither number nor function; and when a body is assembled, values outside E >
-    0, -1 < nu < 1/2, rho > 0, 0 <= xi < 1, with the first place of them, and Functions or
-    expressions of another mesh.
+    Args:
+        E: Young's modulus [Pa].
+        nu: Poisson's ratio.
+        rho: density [kg/m³].
+        xi: ratio of damping, which ``DampingRatio`` reads.
+
+    Raises:
+        InputError: neither number nor function; and when a body is assembled, values outside E > 0,
+            -1 < nu < 1/2, rho > 0, 0 <= xi < 1, with the first place of them, and Functions or
+            expressions of another mesh.
     """
 
     E: Values
@@ -74,25 +79,31 @@ class Heterogeneous:
     @property
     def varies(self) -> bool:
         """Return whether something changes inside of cells."""
-        given = [one for one in (self.E, self.nu, self.rho, self.xi) if callable(one)]
+        # a Function with one unknown a cell is constant there; of all else nothing is known
+        functions = [value for value in (self.E, self.nu, self.rho, self.xi) if callable(value)]
         return not all(
-            _is_function(one) and one.function_space.dofmap.dof_layout.num_dofs == 1
-            for one in given
+            _is_function(value) and value.function_space.dofmap.dof_layout.num_dofs == 1
+            for value in functions
         )
 
     def at(self, space: Any, cells: Indices) -> ElasticValues:
-        """Return the constants at all unknowns of a DG0 or DG1 space.
+        """Return the constants at all unknowns of a DG0 or DG1 space. Collective.
 
-        InputError, on all ranks, for values on these cells that no material has. Collective.
+        Args:
+            space: that of functions on cells.
+            cells: local cells of this material; elsewhere values may be anything.
+
+        Raises:
+            InputError: on all ranks, values on these cells that no material has.
         """
         comm = MpiComm(space.mesh.comm)
         mine = np.zeros(len(compat.function(space).x.array), dtype=bool)
         mine[compat.cell_blocks(space)[cells]] = True
         values = {
-            name: _values(words, getattr(self, name), space, comm)
+            name: _interpolate(words, getattr(self, name), space, comm)
             for name, (words, *_) in RANGES.items()
         }
-        refuse(_defects(values, mine, space), comm)
+        refuse(_find_defects(values, mine, space), comm)
         return ElasticValues(**values)
 
 
@@ -101,7 +112,7 @@ def _is_function(value: Any) -> bool:
     return isinstance(value, Expr) and hasattr(value, "function_space")
 
 
-def _values(words: str, value: Values, space: Any, comm: MpiComm) -> Array:
+def _interpolate(words: str, value: Values, space: Any, comm: MpiComm) -> Array:
     """Return a constant at all unknowns of a cellwise space. Collective.
 
     Args:
@@ -113,7 +124,7 @@ def _values(words: str, value: Values, space: Any, comm: MpiComm) -> Array:
     Raises:
         InputError: on all ranks, a value of another mesh, and one that cannot be evaluated.
     """
-    found = compat.function(space)
+    constant = compat.function(space)
     domains = extract_domains(value) if isinstance(value, Expr) else ()
     if any(one.ufl_id() != space.mesh.ufl_domain().ufl_id() for one in domains):
         raise InputError(
@@ -132,21 +143,22 @@ def _values(words: str, value: Values, space: Any, comm: MpiComm) -> Array:
 
     def fill() -> None:
         if domains:
-            found.interpolate(value if _is_function(value) else compat.expression(value, space))
+            field = value if _is_function(value) else compat.expression(value, space)
+            constant.interpolate(field)
         elif callable(value) and not isinstance(value, Expr):
-            found.interpolate(at_points)
+            constant.interpolate(at_points)
         else:
-            found.x.array[:] = float(value)
+            constant.x.array[:] = float(value)
 
     on_all(comm, f"Heterogeneous: {words}", fill)
-    return np.array(found.x.array)
+    return np.array(constant.x.array)
 
 
-def _defects(values: dict[str, Array], mine: Mask, space: Any) -> Iterator[str]:
-    """Return what is wrong with the values of this rank.
+def _find_defects(values: dict[str, Array], mine: Mask, space: Any) -> Iterator[str]:
+    """Yield a sentence on each constant with values of this rank that no material has.
 
     Args:
-        values: of each constant, at all unknowns of the space.
+        values: of each constant by name, at all unknowns of the space.
         mine: which unknowns are of cells of the material.
         space: the cellwise space.
     """
@@ -154,5 +166,5 @@ def _defects(values: dict[str, Array], mine: Mask, space: Any) -> Iterator[str]:
         wrong = np.flatnonzero(mine & ~((values[name] > low) & (values[name] < high)))
         if len(wrong):
             place = space.tabulate_dof_coordinates()[wrong[0], : space.mesh.geometry.dim]
-            found = values[name][wrong[0]]
-            yield f"Heterogeneous: {words} is {found:g} at {describe_point(place)}; give {remedy}"
+            value = values[name][wrong[0]]
+            yield f"Heterogeneous: {words} is {value:g} at {describe_point(place)}; give {remedy}"

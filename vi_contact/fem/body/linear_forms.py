@@ -1,7 +1,4 @@
-"""Take loads as a user of UFL writes them.
-
-They are linear forms, the virtual work of the load on a displacement v.
-"""
+"""Take loads as a user of UFL writes them: linear forms, their work on a displacement v."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -53,7 +50,7 @@ class LinearForm:
     form: Callable[[Any], Any]
     history: Callable[[float], float] | None = None
     update: Callable[[float], Any] | None = None
-    # space -> forces
+    # space -> (owned full,) forces [N] of a form that is assembled once
     _once: Any = field(default_factory=WeakKeyDictionary, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -80,22 +77,27 @@ class LinearForm:
         return self.update is None
 
     def full(self, space: FemSpace, thickness: float) -> Callable[[float], Array]:
-        """Return t -> the forces (owned full,), less the history; without update as once assembled.
+        """Return a function t [s] -> forces (owned full,) [N], less the history. Collective.
 
-        Collective.
+        Args:
+            space: the body's unknowns.
+            thickness: that of the section [m], a factor of the forces.
+
+        Raises:
+            InputError: on all ranks, what is no linear form in v on the mesh of the space.
         """
         if space in self._once:
             return lambda t: np.asarray(self._once[space])
         name = f"{NAME}: form"
         v = ufl.TestFunction(space.V)
         form = form_of(name, self.form, space, v)
-        vector_of = on_all(space.comm, name, lambda: space.compiled(form))
+        compiled = on_all(space.comm, name, lambda: space.compile_form(form))
         update = self.update
 
-        def at(t: float) -> Array:
+        def assemble_at(t: float) -> Array:
             if update is not None:
                 on_all(space.comm, f"{NAME}: update({t:g})", lambda: update(t))
-            vector = compat.assemble_vector(vector_of)
+            vector = compat.assemble_vector(compiled)
             forces = thickness * vector.array_r
             vector.destroy()
             defect = (
@@ -103,11 +105,11 @@ class LinearForm:
                 "Constants and numbers"
             )
             refuse(["" if np.all(np.isfinite(forces)) else defect], space.comm)
-            return np.asarray(
-                forces if update is not None else self._once.setdefault(space, forces)
-            )
+            if update is None:
+                forces = self._once.setdefault(space, forces)
+            return np.asarray(forces)
 
-        return at
+        return assemble_at
 
 
 LOADS = Traction, BodyForce, InitialStrain, LinearForm

@@ -1,6 +1,4 @@
-"""Describe what acts on a body.
-
-It is prescribed displacements, tractions and body forces (boundary method, eqs. 3, 4, 6).
+"""Describe prescribed displacements, tractions and body forces (boundary method, eqs. 3, 4, 6).
 
 Fields are given at points: a callable takes points (k, d) [m] and the time [s] and returns values
 (k, d). They are interpolated at the nodes and then integrated exactly, so a load costs one sparse
@@ -19,7 +17,7 @@ from ...core.algebra import Array, Comm, Indices
 from ...core.checks import explain_error, function, number, optional, quote, refuse
 from ...core.quantities import Unit
 from .. import compat
-from ..mesh.group_checks import components_given, components_of, facets_of, field_given
+from ..mesh.group_checks import check_components, check_field, components_of, facets_of
 from ..mesh.tagged_mesh import Facets
 
 Field = Callable[[Array, float], Array]
@@ -27,9 +25,7 @@ Value = tuple[float, ...] | Field
 
 
 def evaluate(name: str, value: Value, points: Array, t: float, comm: Comm) -> Array:
-    """Evaluate the value at this rank's points, (k, d).
-
-    InputError on all ranks for NaN, other shapes. Collective.
+    """Return the values (k, d) at this rank's points. Collective.
 
     Args:
         name: what messages call the value.
@@ -37,6 +33,9 @@ def evaluate(name: str, value: Value, points: Array, t: float, comm: Comm) -> Ar
         points: (k, d) of this rank [m].
         t: time [s].
         comm: the ranks.
+
+    Raises:
+        InputError: on all ranks, NaN, other shapes, and what a function of the user's raises.
     """
     result, defect = evaluate_here(name, value, points, t)
     refuse([defect], comm)
@@ -44,15 +43,16 @@ def evaluate(name: str, value: Value, points: Array, t: float, comm: Comm) -> Ar
 
 
 def evaluate_here(name: str, value: Value, points: Array, t: float) -> tuple[Array, str]:
-    """Return (values at the points, what is wrong with them or an empty text).
-
-    The values are zeros where something is wrong.
+    """Return the values at points, and what is wrong with them instead of raising it.
 
     Args:
         name: what messages call the value.
         value: (d,) numbers, or a function of points and time.
         points: (k, d) [m].
         t: time [s].
+
+    Returns:
+        (k, d), zeros where something is wrong, and a sentence, empty where nothing is.
     """
     if len(points) == 0:
         return np.zeros_like(points), ""  # users' functions need not cope with no points
@@ -88,10 +88,16 @@ def _zero(points: Array, t: float) -> Array:
 class Prescribed:
     """Prescribe u_i = U_i(x, t) on facets, with the velocity and acceleration of the same motion.
 
-    ``components``: which displacement components are prescribed (all when None); the others stay
-    free (rollers). The mass and damping of the boundary nodes enter the equations, so all three
-    time functions are needed; left out they are zero (a clamped part, or a displacement constant in
-    time).
+    The mass and damping of the boundary nodes enter the equations, so all three time functions are
+    needed; left out they are zero (a clamped part, or a displacement constant in time).
+
+    Args:
+        facets: the part of the boundary.
+        displacement: U, (d,) numbers or points (k, d) [m] and t [s] -> (k, d).
+        velocity: the like, U'.
+        acceleration: the like, U''.
+        components: which displacement components are prescribed, all when None; the others stay
+            free (rollers).
     """
 
     facets: Facets
@@ -103,8 +109,8 @@ class Prescribed:
     def __post_init__(self) -> None:
         facets_of("Prescribed", "facets", self.facets)
         for name in ("displacement", "velocity", "acceleration"):
-            field_given("Prescribed", name, getattr(self, name))
-        components_given("Prescribed", self.components)
+            check_field("Prescribed", name, getattr(self, name))
+        check_components("Prescribed", self.components)
 
     @property
     def name(self) -> str:
@@ -163,20 +169,23 @@ class Prescribed:
 
         They are objects whose methods are given, as ``BaseMotion``.
         """
-        owners = {
-            id(owner): owner
-            for owner in (getattr(value, "__self__", None) for value in self.motions)
-        }
-        return tuple(one for owner in owners.values() for one in getattr(owner, "companions", ()))
+        # each once: the three functions are usually methods of one object
+        owners = {}
+        for value in self.motions:
+            owner = getattr(value, "__self__", None)
+            owners[id(owner)] = owner
+        companions: list[Any] = []
+        for owner in owners.values():
+            companions += getattr(owner, "companions", ())
+        return tuple(companions)
 
     def same_motion(self, other: "Prescribed") -> bool:
         """Return whether both say the same of the components that both prescribe."""
         mine = self.components
         theirs = other.components
-        apart = mine is not None and theirs is not None and not set(mine) & set(theirs)
-        return apart or all(
-            _same(one, two) for one, two in zip(self.motions, other.motions, strict=True)
-        )
+        if mine is not None and theirs is not None and not set(mine) & set(theirs):
+            return True
+        return all(map(_agree, self.motions, other.motions))
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,11 +216,11 @@ class Support:
         return self.condition.at(points, self.places, t, derivative)
 
 
-def _same(one: Value, other: Value) -> bool:
-    """Say whether two values are one, or equal constants; a function not given is zero."""
-    if callable(one) or callable(other):
-        return bool(one == other) or (_at_rest(one) and _at_rest(other))
-    return np.array_equal(one, other)
+def _agree(value: Value, other: Value) -> bool:
+    """Say whether two values are one function, or equal constants; one not given is zero."""
+    if callable(value) or callable(other):
+        return bool(value == other) or (_at_rest(value) and _at_rest(other))
+    return np.array_equal(value, other)
 
 
 def _at_rest(value: Value) -> bool:
@@ -220,14 +229,17 @@ def _at_rest(value: Value) -> bool:
 
 
 class ActingLoad:
-    """Say where and how a load acts in forms; by default in the whole body, and all of it."""
+    """Say where and how a load acts in forms; by default in the whole body, and all of it.
+
+    The load of nodal values g is ∫ acting(g)·v over ``measure``.
+    """
 
     value: Value
     history: Callable[[float], float] | None
 
     def __post_init__(self) -> None:
         owner = type(self).__name__
-        field_given(owner, "value", self.value)
+        check_field(owner, "value", self.value)
         optional(
             function, owner, "history", self.history, "give a function of the time [s], or None"
         )
@@ -250,10 +262,13 @@ class ActingLoad:
 class Traction(ActingLoad):
     """Apply the traction S_i = F_i(x, t) [Pa] on facets.
 
-    ``history`` is a factor f(t) of a value constant in time.
-
     With a history, or with a tuple, the load is assembled once; a callable without history is
     evaluated every step.
+
+    Args:
+        facets: the part of the boundary.
+        value: (d,) numbers, or a function of points (k, d) [m] and the time [s] -> (k, d).
+        history: factor f(t) of the value at t = 0 s.
     """
 
     facets: Facets
@@ -286,12 +301,14 @@ class TangentialTraction(Traction):
 class Pressure(Traction):
     """Apply S = -p(x, t) n [Pa], a pressure p > 0 against the outward normal n of the facets.
 
-    Such are water, uplift in a joint.
+    Such are water, uplift in a joint. p is interpolated at nodes: resultants of one that is linear
+    between them are exact, so let a node lie at the water level.
 
-    ``value``: a number, or a function of points (k, d) [m] and the time [s] -> (k,), asked at all
-    nodes of the body; it is kept as the first component of a vector field. p is interpolated at
-    nodes: resultants of one that is linear between them are exact, so let a node lie at the water
-    level. ``history``: as of ``Traction``.
+    Args:
+        facets: the part of the boundary.
+        value: a number, or a function of points (k, d) [m] and the time [s] -> (k,), asked at all
+            nodes of the body; it is kept as the first component of a vector field.
+        history: as of ``Traction``.
     """
 
     value: Annotated[float | Callable[[Array, float], Array], Unit("Pa")]  # type: ignore[assignment]  # what is given
@@ -302,16 +319,14 @@ class Pressure(Traction):
             function("Pressure", "value", given, "give a number or a function of points and time")
 
             def field(points: Array, t: float) -> Array:
-                return np.multiply.outer(
-                    np.broadcast_to(given(points, t), len(points)), np.eye(points.shape[1])[0]
-                )
+                pressures = np.broadcast_to(given(points, t), len(points))
+                return np.multiply.outer(pressures, np.eye(points.shape[1])[0])
 
             object.__setattr__(self, "value", field)
         else:
-            axes = facets_of("Pressure", "facets", self.facets).mesh.geometry.dim
-            object.__setattr__(
-                self, "value", (number("Pressure", "value", given, unit="Pa"), *[0.0] * (axes - 1))
-            )
+            d = facets_of("Pressure", "facets", self.facets).mesh.geometry.dim
+            pressure = number("Pressure", "value", given, unit="Pa")
+            object.__setattr__(self, "value", (pressure, *[0.0] * (d - 1)))
         super().__post_init__()
 
     def acting(self, g: Any, mesh: Mesh) -> Any:

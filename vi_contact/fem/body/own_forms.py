@@ -64,8 +64,6 @@ class OwnForms(ElasticForms):
     """Hold the user's forms of one body.
 
     ``fields`` are those of the material beside them, empty where there is none.
-
-    Its matrices are assembled and checked at once. InputError as for ``Forms``. Collective.
     """
 
     def __init__(
@@ -76,6 +74,18 @@ class OwnForms(ElasticForms):
         section: Section,
         damping: Damping,
     ) -> None:
+        """Assemble and check the matrices at once. Collective.
+
+        Args:
+            space: the body's unknowns.
+            given: the user's forms.
+            materials: pairs of local cells and a material, none where the forms need none.
+            section: that of the body.
+            damping: a law whose C is added to that of the forms.
+
+        Raises:
+            InputError: as for ``Forms``.
+        """
         super().__init__(space, materials, section, damping)
         if given.mass is None and not materials:
             raise InputError(
@@ -86,41 +96,44 @@ class OwnForms(ElasticForms):
         self.tells_stress = given.stress is not None
         self.own_damping = given.damping is not None
         self.densities = given.mass is None and given.damping is None
+
+        # C = alpha M + beta K + viscous stresses + the user's own, of which any may be missing
         rayleigh = damping if isinstance(damping, Rayleigh) else Rayleigh(0.0, 0.0)
         shares = {"M": rayleigh.alpha, "K": rayleigh.beta}
         self.damped = given.damping is not None or any(shares.values()) or self.viscous is not None
         if given.stress is not None:
             refuse_stress(given.stress, space)
         self._forms = {
-            name: self._own(name) or super(OwnForms, self).bilinear(name) for name in "KM"
+            name: self._read_form(name) or super(OwnForms, self).bilinear(name) for name in "KM"
         }
         dampers = [
             compat.constant(space.mesh, share) * self._forms[name]
             for name, share in shares.items()
             if share
         ]
-        dampers += [self._viscous_form()] if self.viscous else []
-        dampers += [] if given.damping is None else [self._own("C")]
+        if self.viscous:
+            dampers.append(self._viscous_form())
+        if given.damping is not None:
+            dampers.append(self._read_form("C"))
         if dampers:
             self._forms["C"] = sum(dampers[1:], dampers[0])
         self._full = {
-            name: matrix_of(ROLES[name], space, partial(space.compiled, form))
+            name: matrix_of(ROLES[name], space, partial(space.compile_form, form))
             for name, form in self._forms.items()
         }
         refuse_masses(self._full["M"], space)
-        self.symmetric = all(is_symmetric(one, space) for one in self._full.values())
-        self.notes = self._notes(bool(materials))
+        self.symmetric = all(is_symmetric(matrix, space) for matrix in self._full.values())
+        self.notes = self._describe(bool(materials))
 
-    def _own(self, name: str) -> Any:
-        """Return the form that was given for a matrix, or None."""
+    def _read_form(self, name: str) -> Any:
+        """Return the form that was given for M, C or K, or None. Collective."""
         call = getattr(self._given, ROLES[name])
-        return (
-            None
-            if call is None
-            else form_of(f"Forms: {ROLES[name]}", call, self.space, self.u, self.v)
-        )
+        if call is None:
+            return None
+        return form_of(f"Forms: {ROLES[name]}", call, self.space, self.u, self.v)
 
-    def _notes(self, material: bool) -> tuple[str, ...]:
+    def _describe(self, material: bool) -> tuple[str, ...]:
+        """Return sentences on what comes from where; ``material``: whether there is one beside."""
         mass = "the density of the material" if self._given.mass is None else "a form"
         stress = "a" if self.tells_stress else "no"
         waves = "the material beside them" if material else "no material"
@@ -147,7 +160,11 @@ class OwnForms(ElasticForms):
         d = self.space.dimension
         h = self.section.thickness
         across = h * sigma[2, 2] if d == 2 and sigma.ufl_shape == (3, 3) else 0.0
-        return h * ufl.as_tensor([[sigma[i, j] for j in range(d)] for i in range(d)]), across
+        # of a tensor (3, 3) in the plane the corner is that of the plane
+        rows = []
+        for i in range(d):
+            rows.append([sigma[i, j] for j in range(d)])
+        return h * ufl.as_tensor(rows), across
 
     def hooke(self, eps: Any, across: Any, trace: Any) -> tuple[Any, Any]:
         """Raise InputError: the forms do not tell the C of a material.

@@ -1,6 +1,4 @@
-"""Go from a static stage to one on other supports.
-
-Reactions of removed ones become forces, added ones hold the body.
+"""Go from a static stage to one on other supports: reactions of removed ones become forces.
 
 Dashpots hold no static load. A gravity stage therefore stands on rollers or clamps; where the
 dynamic stage has dashpots or free sides instead, what these supports carried goes on as the
@@ -39,35 +37,46 @@ def release(
     *,
     earlier: Sequence[ContactProblem] = (),
 ) -> tuple[ContactProblem, State]:
-    """Return (problem with the reactions of removed supports as forces, its first state).
+    """Return the problem that goes on after a static stage, and its first state, at rest at t = 0.
 
-    The state is at rest, after a static stage.
+    The reactions of supports that it does without are constant forces of this problem. The space of
+    ``problem`` notes where supports that it adds hold the body.
 
-    ``state``: of ``static_equilibrium`` on ``static``; ``problem``: on the same mesh, with the same
-    materials, loads and contact points, and a motion that starts from rest. t = 0. ``earlier``:
-    problems of the stages before ``static``, whose supports may be released already. The space of
-    ``problem`` notes where added supports hold it. InputError for another mesh or other contact
-    points, or when forces are missing where nothing was released.
+    Args:
+        static: the problem of the static stage.
+        state: of ``static_equilibrium`` on it.
+        problem: on the same mesh, with the same materials, loads and contact points, and a motion
+            that starts from rest.
+        earlier: problems of the stages before ``static``, whose supports may be released already.
+
+    Raises:
+        InputError: another mesh or other contact points, supports that hold the body elsewhere, and
+            forces that are missing where nothing was released.
     """
     stages = several("release", "earlier", earlier, "give a list of problems, or leave it out")
-    for one in (static, problem, *stages):
-        check_problem_given("release", one)
+    for given in (static, problem, *stages):
+        check_problem_given("release", given)
     check_sizes("release", static, state)
+
+    # where the body is, and that the problem begins there
     before, after = _spaces(static, problem)
     nodal = before.expand(static.cartesian(state.u), state.t)
     added = _stand(before, after, nodal)
     u0 = after.restrict(nodal)
     still = np.zeros_like(u0)
-    _, first = started(problem, u0, still, state)
+    _, first = begin_from(problem, u0, still, state)
     _refuse_moved(static, state, nodal, problem, first)
-    spaces = [_spaces(one, problem)[0] for one in (static, *earlier)]
-    held = [one.held | np.isin(one.nodes, one.tied_nodes)[:, None] for one in spaces]
+
+    # unknowns that some support has held before may have lost it, and those beside an added one
+    spaces = [_spaces(stage, problem)[0] for stage in (static, *earlier)]
+    held = [space.held | np.isin(space.nodes, space.tied_nodes)[:, None] for space in spaces]
     was_held = np.any([*held, _beside(after, added)], axis=0).ravel()[after.free]
-    return started(problem, u0, still, state, _missing(problem, u0, first, was_held))
+    force = _compute_missing(problem, u0, first, was_held)
+    return begin_from(problem, u0, still, state, force)
 
 
 def _spaces(static: ContactProblem, problem: ContactProblem) -> tuple[FemSpace, FemSpace]:
-    """Return the unknowns of both problems.
+    """Return the unknowns of both problems. Collective.
 
     Raises:
         InputError: they are on different meshes, or have other contact points.
@@ -96,25 +105,21 @@ def same_supports(before: ContactProblem, problem: ContactProblem) -> bool:
     Raises:
         InputError: other contact points.
     """
-    one, other = _spaces(before, problem)
-    if largest(
-        one.comm,
-        not (np.array_equal(one.held, other.held) and np.array_equal(one.numbers, other.numbers)),
-    ):
+    old, new = _spaces(before, problem)
+    alike = np.array_equal(old.held, new.held) and np.array_equal(old.numbers, new.numbers)
+    if largest(old.comm, not alike):
         return False
-    other.stands = one.stands
+    new.stands = old.stands
     return True
 
 
-def started(
+def begin_from(
     problem: ContactProblem, u0: Array, v0: Array, state: State, force: Array | float = 0.0
 ) -> tuple[ContactProblem, State]:
-    """Return the problem that begins with u0, v0 and has a constant force [N] more.
-
-    u0 and v0 are on its own unknowns. That beginning has the contact of another state.
+    """Return the problem that begins with u0, v0 and has a constant force more, and that beginning.
 
     Args:
-        problem: the problem that begins.
+        problem: the problem that begins; u0, v0 and the force are on its own unknowns.
         u0: (n,) initial displacement [m].
         v0: (n,) initial velocity [m/s].
         state: a state with the contact that the beginning has.
@@ -124,18 +129,21 @@ def started(
     system = problem.system
     load = problem.system.load
 
-    def turned(x: Array) -> Array:
+    def turn(x: Array) -> Array:
+        """Return x in the frames of nodes and, by R⁻¹ = 2 - R, relative to what they face."""
         x = surface.in_frames(x)
-        return x.copy() if surface.coupling is None else 2.0 * x - surface.coupling @ x
+        if surface.coupling is None:
+            return x.copy()
+        return 2.0 * x - surface.coupling @ x
 
     r_t = state.r_t if problem.frictional else None
-    first = State(0.0, 0, turned(u0), turned(v0), state.r_n, state.active, r_t=r_t)
+    first = State(0.0, 0, turn(u0), turn(v0), state.r_n, state.active, r_t=r_t)
     load = replace(load, constant=load.constant + force)
     return replace(problem, system=system.changed(u0=u0, v0=v0, load=load)), first
 
 
-def _missing(problem: ContactProblem, u0: Array, state: State, was_held: Mask) -> Array:
-    """Return F = K u_0 - f(0) + B_nᵀ r_n + B_tᵀ r_t.
+def _compute_missing(problem: ContactProblem, u0: Array, state: State, was_held: Mask) -> Array:
+    """Return F = K u_0 - f(0) + B_nᵀ r_n + B_tᵀ r_t (n,) [N]. Collective.
 
     Args:
         problem: the problem that begins.
@@ -148,20 +156,21 @@ def _missing(problem: ContactProblem, u0: Array, state: State, was_held: Mask) -
     """
     elastic = problem.system.K @ u0
     force = np.asarray(elastic - problem.system.load.at_rest(0.0) + _contact_force(problem, state))
-    missing = np.array([max_abs(force[~was_held]), max_abs(elastic), max_abs(force)])
-    missing = problem.surface.comm.max(missing)
-    if missing[0] > BALANCED * max(missing[1:]):
+    sizes = np.array([max_abs(force[~was_held]), max_abs(elastic), max_abs(force)])
+    missing, *largest_forces = problem.surface.comm.max(sizes)
+    if missing > BALANCED * max(largest_forces):
         raise InputError(
-            f"{missing[0]:.3g} N are missing where no support was released: give both stages the "
+            f"{missing:.3g} N are missing where no support was released: give both stages the "
             "same materials, loads and friction, and a motion that starts from rest"
         )
     log.info(
-        "supports released: their reactions remain as nodal forces, the largest %.4g N", missing[2]
+        "supports released: their reactions remain as nodal forces, the largest %.4g N",
+        largest_forces[-1],
     )
     return force
 
 
-def removed_support(
+def find_removed_support(
     before: ContactProblem, after: ContactProblem, force: Array
 ) -> tuple[str, float]:
     """Return (name, reaction [N]) of the removed support with most of a force. Collective.
@@ -175,32 +184,34 @@ def removed_support(
         force: (n,) on the unknowns of ``after`` [N].
     """
     old, new = _spaces(before, after)
-    found = [("", 0.0)]
+    candidates = [("", 0.0)]
     nodal = np.zeros(new.held.size)
     nodal[new.free] = force
+    # forces that are round-off of these are none
     size = largest(new.comm, max(max_abs(after.system.K @ after.system.u0), max_abs(force)))
+    # of each support, and of the ties that are gone, what of the force is on what it held
     untied = np.isin(old.nodes, np.setdiff1d(old.tied_nodes, new.tied_nodes)), slice(None)
-    for name, places in [
-        *((support.condition.name, support.places) for support in old.supports),
-        ("tied", untied),
-    ]:
+    supports = [(support.condition.name, support.places) for support in old.supports]
+    for name, places in [*supports, ("tied", untied)]:
         own = np.zeros_like(old.points)
         own[places] = np.where(new.held, 0.0, nodal.reshape(own.shape))[places]
         peak = largest(new.comm, max_abs(own.ravel()))
         resultant = float(np.linalg.norm(new.comm.sum(own.sum(axis=0))))
-        found += [(name, max(resultant, peak))] if peak > BALANCED * size else []
-    return max(found, key=lambda one: one[1])
+        if peak > BALANCED * size:
+            candidates.append((name, max(resultant, peak)))
+    return max(candidates, key=lambda candidate: candidate[1])
 
 
 def _stand(before: FemSpace, after: FemSpace, nodal: Array) -> Mask:
-    """Let what ``after`` holds in addition stay where the body is.
-
-    Returned is the (k, d) mask of what stays off its own place.
+    """Let what ``after`` holds in addition stay where the body is (``after.stands``). Collective.
 
     Args:
         before: the unknowns of the stage before.
         after: those of the problem that begins.
         nodal: (k, d) where nodes are [m].
+
+    Returns:
+        (k, d) mask of the components that stay off their own place.
     """
     stays = np.where(after.held & ~before.held, nodal, 0.0)
     if before.stands is not None:
@@ -210,9 +221,13 @@ def _stand(before: FemSpace, after: FemSpace, nodal: Array) -> Mask:
 
 
 def _beside(space: FemSpace, chosen: Mask) -> Mask:
-    """Return all components of the owned nodes that share a cell with chosen ones.
+    """Return a mask (k, d) of the owned nodes that share a cell with a node of chosen components.
 
-    The cell is of any rank, the nodes are those of chosen components (k, d).
+    The cell may be of any rank. Collective.
+
+    Args:
+        space: the body's unknowns.
+        chosen: (k, d) mask of components of the owned nodes.
     """
     numbers = np.concatenate(from_each(space.comm, space.nodes[chosen.any(axis=1)]))
     cells = space.node_of_block[compat.cell_blocks(space.V)]
@@ -236,11 +251,13 @@ def _refuse_moved(
         problem: the problem that begins.
         begun: its first state.
     """
-    there = problem.system.space.expand(problem.cartesian(begun.u), 0.0)  # type: ignore[attr-defined]
+    # how far nodes of the body, and gaps of its conditions, are from where the stage has left them
+    space: FemSpace = problem.system.space  # type: ignore[assignment]
+    begins = space.expand(problem.cartesian(begun.u), 0.0)
     before = static.surface.gap(state.t) - static.surface.normal_values(state.u)
     after = problem.surface.gap(0.0) - problem.surface.normal_values(begun.u)
-    away = max(max_abs((there - nodal).ravel()), max_abs(after - before))
-    distance, size = problem.surface.comm.max(np.array([away, max_abs(nodal.ravel())]))
+    own = max(max_abs((begins - nodal).ravel()), max_abs(after - before))
+    distance, size = problem.surface.comm.max(np.array([own, max_abs(nodal.ravel())]))
     if distance > BALANCED * size:
         raise InputError(
             f"a support or tie of the problem is {distance:.3g} m away from where the static stage "
@@ -249,7 +266,7 @@ def _refuse_moved(
 
 
 def _contact_force(problem: ContactProblem, state: State) -> Array:
-    """Return B_nᵀ r_n + B_tᵀ r_t on the system's own unknowns."""
+    """Return B_nᵀ r_n + B_tᵀ r_t (n,) [N] on the system's own unknowns, without frames."""
     surface = problem.surface
     force = surface.reaction_load(state.r_n, problem.system.rows, state.r_t)
     if surface.coupling is not None:  # the load of relative unknowns is Rᵀ f, and R⁻¹ = 2 - R

@@ -1,6 +1,15 @@
-"""Say what the unknowns of a finite element system mean.
+"""Say what the unknowns of a finite element system mean: which component of which node.
 
-This is nodes, bodies, free and prescribed parts, points, output.
+Words, from large to small:
+
+    node        a point of the mesh with a number that no number of ranks changes (mesh.numbering)
+    block       the place of a node on this rank; owned ones first, then ghosts
+    component   block * d + c, c < d: a place in a *full* vector, of owned nodes
+    unknown     a component that the equations solve for; vectors of the system have these alone
+
+A component is free, held (by a support) or tied (it follows another one); unknowns are the free
+ones. ``FemSpace`` keeps the tables between them, and ``elimination`` takes vectors from one to the
+other: ``restrict`` and ``pull`` from full to free, ``expand`` back.
 """
 
 import logging
@@ -16,7 +25,7 @@ from ...core.errors import InputError
 from ...core.system import SemiDiscreteSystem
 from .. import compat
 from ..matrices.petsc_algebra import PetscAlgebra
-from ..mesh.communicators import MpiComm, kept
+from ..mesh.communicators import MpiComm, keep_communicator
 from ..mesh.group_checks import cells_of
 from ..mesh.nodal_space import NodalSpace, bounding_box
 from ..mesh.numbering import NodeTable, facet_rows, node_numbers
@@ -40,12 +49,13 @@ def space_of(owner: str, system: Any) -> "FemSpace":
 
 
 def bodies_of(system: SemiDiscreteSystem, cells: Cells) -> tuple[int, ...]:
-    """Return the numbers of the bodies that a cell group is, parts of the mesh that share no node.
+    """Return the numbers of the bodies that a cell group consists of. Collective.
 
-    Collective.
+    Bodies are parts of the mesh that share no node; ``with_weight(system, bodies=…)`` takes these
+    numbers.
 
-    They are those of ``with_weight(system, bodies=…)``. InputError for a group that is only a part
-    of a body.
+    Raises:
+        InputError: a group that is only a part of a body.
     """
     space = space_of("bodies_of", system)
     cells_of("bodies_of", "cells", cells, space.mesh)
@@ -62,30 +72,29 @@ def bodies_of(system: SemiDiscreteSystem, cells: Cells) -> tuple[int, ...]:
     return tuple(mine.tolist())
 
 
-def known_matrices(owner: str, system: SemiDiscreteSystem, names: str) -> None:
-    """Warn when M, C or K of a system is not what fem.assemble made.
+def warn_of_other_matrices(owner: str, system: SemiDiscreteSystem, names: str) -> None:
+    """Warn, on rank 0, of M, C or K that fem.assemble did not make, before an output ignores them.
 
-    It is for outputs that go by the materials given there.
-
-    Springs added to K leave the stresses of the elements as they are; another material does not.
+    Stresses and section forces go by the materials given to ``assemble``. Springs that a user adds
+    to K leave them right; another material does not.
 
     Args:
         owner: who asks.
         system: a system of ``assemble``.
         names: letters of the matrices that count, such as "MK".
     """
-    found = system.space.forms.foreign(system, names)  # type: ignore[attr-defined]
-    if found and system.algebra.comm.rank == 0:
+    foreign = system.space.forms.foreign(system, names)  # type: ignore[attr-defined]
+    if foreign and system.algebra.comm.rank == 0:
         log.warning(
             "%s: %s of the system is not the one that fem.assemble made: this output uses the "
             "materials, section and damping given there",
             owner,
-            " and ".join(found),
+            " and ".join(foreign),
         )
 
 
 def translations(nodes: int, dimension: int) -> list[Array]:
-    """Return the unit translation of so many nodes in every direction, full vectors."""
+    """Return the unit translation of so many nodes in every direction, d full vectors."""
     return [np.tile(e, nodes) for e in np.eye(dimension)]
 
 
@@ -96,10 +105,16 @@ class FemSpace(NodalSpace):
 
     Attributes:
         V: the DOLFINx function space; dimension d.
-        supports: what holds components of nodes, and which; prescribed: their conditions.
+        algebra: makes matrices on the communicator of the mesh.
+        comm: the ranks, which last as long as the program.
+        dimension: d.
+        size: diagonal of the body's bounding box [m].
+        supports: what holds components of nodes, and which; where two hold one the later counts.
+        prescribed: the conditions of the supports, in the same order.
         moves: whether some support moves what it holds.
-        held, tied: (owned nodes, d) masks of components that are held, or follow those of another
-            node.
+        ties: boundaries that move together.
+        held: (owned nodes, d) mask of components that are held.
+        tied: (owned nodes, d) mask of components that follow those of another node.
         free: (owned full,) mask of the other components.
         tied_nodes: numbers of all nodes that move together with another, on every rank.
         tied_unknowns: mask of the free unknowns of such nodes, None without ties.
@@ -107,12 +122,14 @@ class FemSpace(NodalSpace):
             -1 where held.
         degree: 1 for P1 and Q1, 2 for P2 and Q2.
         quadrature_degree: that of all its forms; None: as UFL estimates it.
-        nodes: numbers of the nodes of the owned blocks, those of the mesh (``mesh.numbering``: of
-            mid-points too).
-        points: their coordinates (k, d).
-        node_of_block, body_of_block: numbers and bodies of nodes, those of ghosts too.
-        ids: rank-independent numbers of the free unknowns (node * d + component).
-        unknowns: number of free unknowns on all ranks.
+        nodes: (owned nodes,) their numbers (``mesh.numbering``: of mid-points too).
+        points: (owned nodes, d) coordinates [m].
+        node_of_block: (blocks,) numbers of the nodes, those of ghosts too.
+        body_of_block: (blocks,) their bodies.
+        ids: (n,) numbers of the unknowns on any ranks (node * d + component).
+        free_index: (owned full,) which owned unknown a component is, -1 where it is not free.
+        unknowns: number of unknowns on all ranks.
+        elimination: P of u_full = P u + U.
         forms: the ElasticForms of the system made on it; stress output needs them.
         stands: (k, d) where supports hold nodes that an earlier stage had moved [m], or None.
     """
@@ -141,7 +158,7 @@ class FemSpace(NodalSpace):
         self.mesh = V.mesh
         self.degree = degree
         self.quadrature_degree = quadrature_degree
-        self.comm: MpiComm = MpiComm(kept(self.mesh.comm))
+        self.comm: MpiComm = MpiComm(keep_communicator(self.mesh.comm))
         self.algebra = PetscAlgebra(self.comm.mpi)
         self.dimension: int = self.mesh.geometry.dim
         self.node_of_block: Indices = nodes.numbers
@@ -155,17 +172,19 @@ class FemSpace(NodalSpace):
         self.ties = tuple(tied)
         shape = (nodes.owned, self.dimension)
 
-        # what is held and what follows is eliminated; the rest is free
+        # what is held and what follows is eliminated; the rest is free. Where tied components are
+        # held on both sides they are held, and follow nobody.
         self.held = np.zeros(shape, dtype=bool)
         for support in supports:
             self.held[support.places] = True
-        links = self._links() if tied else UNTIED
+        links = self._find_links() if tied else UNTIED
         self.tied_nodes: Indices = np.union1d(links.followers, links.leaders) // self.dimension
         self._leader = links.of_nodes(self.dimension) if tied else {}
-        self.tied: Mask = self._followers(links) if tied else np.zeros(shape, dtype=bool)
+        self.tied: Mask = self._find_followers(links) if tied else np.zeros(shape, dtype=bool)
         self.free: Mask = ~(self.held | self.tied).ravel()
 
-        # free components are numbered over all ranks, those that follow have the number of another
+        # free components are numbered over all ranks, those of a rank in a row; those that follow
+        # have the number of another
         ids = self.nodes[:, None] * self.dimension + np.arange(self.dimension)
         self.ids: Indices = ids.ravel()[self.free]
         self.unknowns = int(total(self.comm, self.free.sum()))
@@ -173,7 +192,7 @@ class FemSpace(NodalSpace):
         first = int(self.comm.mpi.exscan(int(self.free.sum())) or 0)
         numbers = np.where(self.free, first + self.free_index, -1)
         if tied:
-            numbers = self._following(links, numbers)
+            numbers = self._number_followers(links, numbers)
         self.numbers: Indices = numbers.reshape(shape)
         together = np.isin(self.nodes, self.tied_nodes)
         self.tied_unknowns: Mask | None = (
@@ -199,30 +218,31 @@ class FemSpace(NodalSpace):
         """Return the bytes of the mesh on this rank."""
         return compat.mesh_bytes(self.mesh)
 
-    def compiled(self, form: Any) -> Any:
-        """Return a form compiled.
+    def compile_form(self, form: Any) -> Any:
+        """Compile a form, with the quadrature degree of the space where it does not say its own.
 
-        Its integrals have the degree of the space, if any, unless they say their own.
+        Collective.
         """
         return compat.compile_form(form, self.quadrature_degree)
 
     def facet_blocks(self, facets: Any) -> Indices:
         """Return the owned blocks (nodes) on the facets, wherever the facets are owned."""
-        return compat.owned_facet_dofs(self.V, facets)
+        return compat.locate_owned_blocks(self.V, facets)
 
     def corners_of_facets(self, facets: Any) -> Indices:
-        """Return the numbers (k, n) of the contact nodes on each of these facets. Collective.
+        """Return the numbers (k, n) of the nodes of facets that may have contact conditions.
 
-        The facets are local, ghosts' too; the nodes are those that may have contact conditions:
-        all, in a hierarchy the vertices.
+        These are all nodes, in a hierarchy the vertices. Collective.
+
+        Args:
+            facets: (k,) local numbers, ghosts' too.
         """
         if self.degree == 1:
-            return node_numbers(self.mesh)[
-                compat.entities_to_geometry(self.mesh, self.mesh.topology.dim - 1, facets)
-            ]
-        return self.node_of_block[facet_rows(self.V, facets)][
-            :, : None if self.hierarchy is None else self.dimension
-        ]
+            vertices = compat.entities_to_geometry(self.mesh, self.mesh.topology.dim - 1, facets)
+            return node_numbers(self.mesh)[vertices]
+        nodes = self.node_of_block[facet_rows(self.V, facets)]
+        # vertices come first: as many as a facet of a tetrahedron has
+        return nodes if self.hierarchy is None else nodes[:, : self.dimension]
 
     @cached_property
     def hierarchy(self) -> Hierarchy | None:
@@ -235,37 +255,41 @@ class FemSpace(NodalSpace):
     # Ties
     # ----------------------------------------------------------------------------------------------
 
-    def _links(self) -> Links:
+    def _find_links(self) -> Links:
         """Return which unknowns move as others do, on every rank. Collective."""
-        sides = [(self._everywhere(tie.first), self._everywhere(tie.second)) for tie in self.ties]
+        sides = [(self._gather(tie.first), self._gather(tie.second)) for tie in self.ties]
         return link(self.ties, sides, self.dimension, PLACE_TOLERANCE * self.size)
 
-    def _everywhere(self, facets: Facets) -> tuple[Indices, Array]:
-        """Return (original numbers, points) of the nodes of facets, ascending, on every rank."""
+    def _gather(self, facets: Facets) -> tuple[Indices, Array]:
+        """Return numbers, ascending, and points of the nodes of facets on all ranks. Collective."""
         blocks = self.facet_blocks(facets.indices)
         parts = self.comm.bcast(self.comm.gather((self.nodes[blocks], self.points[blocks])))
         numbers, points = (np.concatenate(part) for part in zip(*parts, strict=True))
         order = np.argsort(numbers)
         return numbers[order], points[order]
 
-    def _followers(self, links: Links) -> Mask:
-        """Return which owned components follow another node.
+    def _find_followers(self, links: Links) -> Mask:
+        """Return which owned components (owned nodes, d) follow another node. Collective.
+
+        Those that are held, as their leaders are, follow nobody.
 
         Raises:
-            InputError: some of those that move as one are held.
+            InputError: some of those that move as one are held, and others are not.
         """
-        followers = self._of_unknowns(links.followers, self.held) > 0.0
-        leaders = self._of_unknowns(links.leaders, self.held) > 0.0
-        for number in links.followers[followers != leaders]:
+        followers_held = self._read_everywhere(links.followers, self.held) > 0.0
+        leaders_held = self._read_everywhere(links.leaders, self.held) > 0.0
+        for number in links.followers[followers_held != leaders_held]:
             raise InputError(
                 f"component {number % self.dimension} of a tied node is prescribed on one side "
                 "only: prescribe both sides alike, or tie the other components (components=)"
             )
         ids = self.nodes[:, None] * self.dimension + np.arange(self.dimension)
-        return np.isin(ids, links.followers[~followers])
+        return np.isin(ids, links.followers[~followers_held])
 
-    def _following(self, links: Links, numbers: Indices) -> Indices:
-        """Return the unknown of every owned component, where those that follow have one too.
+    def _number_followers(self, links: Links, numbers: Indices) -> Indices:
+        """Return the unknown of every owned component, that of their leaders for followers.
+
+        Collective.
 
         Args:
             links: what follows what.
@@ -273,7 +297,9 @@ class FemSpace(NodalSpace):
                 overwritten.
         """
         d = self.dimension
-        leaders = self._of_unknowns(links.leaders, numbers.reshape(-1, d)).astype(np.int64)
+        leaders = self._read_everywhere(links.leaders, numbers.reshape(-1, d)).astype(np.int64)
+        # of the followers that this rank owns: their place in a full vector, and their leader's
+        # unknown
         blocks = self.blocks_of(links.followers // d)
         owned = blocks >= 0
         row = (d * blocks + links.followers % d)[owned]
@@ -282,18 +308,20 @@ class FemSpace(NodalSpace):
         numbers[row[follows]] = leader[follows]
         return numbers
 
-    def _of_unknowns(self, numbers: Indices, values: Any) -> Array:
-        """Return owned nodal values (k, d) of unknowns, on every rank.
+    def _read_everywhere(self, numbers: Indices, values: Any) -> Array:
+        """Return the values (m,) of components of nodes of any rank, on every rank. Collective.
 
-        An unknown is node number * d + component.
+        Args:
+            numbers: (m,) node number * d + component.
+            values: (owned nodes, d).
         """
         rows = self.at_nodes(numbers // self.dimension, values.astype(float))
         return rows[np.arange(len(numbers)), numbers % self.dimension]
 
     def leaders(self, nodes: Indices) -> Indices:
-        """Return these node numbers, of nodes that follow another that of the other.
+        """Return the numbers of the nodes that these follow in all components.
 
-        It is -1 for those tied in part.
+        A node that follows nobody has its own number, one that is tied in part -1.
         """
         if not self._leader:
             return nodes
@@ -323,11 +351,18 @@ class FemSpace(NodalSpace):
     # Vectors
     # ----------------------------------------------------------------------------------------------
 
-    def prescribed_values(self, t: float, derivative: int = 0) -> Array:
-        """Return the full owned vector of U(x, t) or its time derivative; zero on free components.
+    def evaluate_prescribed(self, t: float, derivative: int = 0) -> Array:
+        """Return U(x, t) or its time derivative, a full vector that is zero on free components.
 
         Where conditions meet, the later one counts; what they say is added to where an earlier
-        stage left the nodes.
+        stage left the nodes. Collective where something moves.
+
+        Args:
+            t: time [s].
+            derivative: 0 for U [m], 1 and 2 for its rates.
+
+        Raises:
+            InputError: on all ranks, values that are no numbers or not finite.
         """
         values = np.zeros((len(self.nodes), self.dimension))
         defects = []
@@ -338,7 +373,9 @@ class FemSpace(NodalSpace):
                 defects.append(defect)
         if defects:
             refuse(defects, self.comm)
-        return (values if derivative or self.stands is None else values + self.stands).ravel()
+        if self.stands is not None and not derivative:
+            values = values + self.stands
+        return values.ravel()
 
     def expand(self, u: Array, t: float, derivative: int = 0) -> Array:
         """Expand a free vector -> nodal values (owned nodes, d), prescribed components included.
@@ -348,20 +385,20 @@ class FemSpace(NodalSpace):
             t: time [s].
             derivative: 0 for displacements, 1 and 2 for their rates.
         """
-        full = self.elimination.expand(u, self.prescribed_values(t, derivative))
+        full = self.elimination.expand(u, self.evaluate_prescribed(t, derivative))
         return full.reshape(-1, self.dimension)
 
     def pull(self, force: Array) -> Array:
         """Pull back by Pᵀ: forces on all owned components -> on the free ones."""
         return self.elimination.pull(force)
 
-    def reduced(self, full: Any) -> Any:
+    def reduce(self, full: Any) -> Any:
         """Return PᵀAP of the free components of a PETSc matrix of all. Collective."""
         return self.elimination.reduce(full)
 
-    def held_columns(self, full: Any) -> Any:
+    def take_held_columns(self, full: Any) -> Any:
         """Return the columns of prescribed components of a PETSc matrix of all. Collective."""
-        return self.elimination.held_columns(full)
+        return self.elimination.take_held_columns(full)
 
     def restrict(self, full: Array) -> Array:
         """Restrict nodal values (owned nodes, d) to the free vector."""

@@ -1,6 +1,4 @@
-"""Tie boundaries whose opposite nodes move together.
-
-Such are tied sides of a soil layer, one period of a periodic body.
+"""Tie boundaries whose opposite nodes move together, as the sides of one period of a body.
 
     u(x) = u(x + a),  x on the first boundary, a the distance between the two
 
@@ -20,21 +18,23 @@ from ...core.algebra import Array, Indices
 from ...core.checks import describe_point
 from ...core.errors import InputError
 from ...meshes.rows import number_parts
-from ..mesh.group_checks import components_given, components_of, facets_of
+from ..mesh.group_checks import check_components, components_of, facets_of
 from ..mesh.tagged_mesh import Facets
 
-PLACE_TOLERANCE = (
-    1e-6  # of the body's size: nodes farther from the place of their partner have none
-)
+# of the body's size: a node that is farther from where its partner should be has none
+PLACE_TOLERANCE = 1e-6
 # original numbers (k,), ascending, and points (k, d) [m] of the nodes of a boundary
 Nodes = tuple[Indices, Array]
 
 
 @dataclass(frozen=True)
 class Tied:
-    """Tie the nodes of ``second`` to those of ``first`` that face them, in all or given components.
+    """Tie the nodes of a boundary to those of another one that face them. Ties may meet.
 
-    Ties may meet.
+    Args:
+        first: a boundary.
+        second: another one, of the same shape and mesh, whose nodes follow those of the first.
+        components: in which their displacements are the same; all when None.
     """
 
     first: Facets
@@ -44,7 +44,7 @@ class Tied:
     def __post_init__(self) -> None:
         for name in ("first", "second"):
             facets_of("Tied", name, getattr(self, name))
-        components_given("Tied", self.components)
+        check_components("Tied", self.components)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,24 +52,28 @@ class Links:
     """Hold unknowns that move as others do, the same arrays on every rank.
 
     An unknown is node number * d + component.
+
+    Attributes:
+        followers: (k,) unknowns that are eliminated.
+        leaders: (k,) the unknown that each of them follows; none of them follows another.
     """
 
     followers: Indices
     leaders: Indices
 
     def of_nodes(self, d: int) -> dict[int, int]:
-        """Return whom tied nodes follow.
+        """Return the node that each tied node follows in all d components.
 
-        This is one other in all d components, or themselves; -1 for those tied in part.
+        Leaders follow themselves, and -1 stands for nodes that are tied in part.
         """
         nodes = np.column_stack([self.followers, self.leaders]) // d
-        found, count = np.unique(nodes, axis=0, return_counts=True)
-        whole = found[count == d]
-        return (
-            dict.fromkeys(nodes.ravel().tolist(), -1)
-            | dict(whole[:, [1, 1]].tolist())
-            | dict(whole.tolist())
-        )
+        pairs, count = np.unique(nodes, axis=0, return_counts=True)
+        whole = pairs[count == d]
+        # what is known of a node replaces what stood there before
+        node_of = dict.fromkeys(nodes.ravel().tolist(), -1)
+        node_of |= dict(whole[:, [1, 1]].tolist())
+        node_of |= dict(whole.tolist())
+        return node_of
 
 
 UNTIED = Links(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
@@ -96,22 +100,23 @@ def link(
         InputError: nodes without a partner, boundaries that share nodes, and a component that does
             not exist.
     """
-    pairs = [_pairs(tie, *both, dimension, near) for tie, both in zip(tied, sides, strict=True)]
+    pairs = [_pair(tie, *both, dimension, near) for tie, both in zip(tied, sides, strict=True)]
     first, second = (np.concatenate(side) for side in zip(*pairs, strict=True))
-    # what hangs together through ties is one part, and moves as one
+    # what hangs together through ties is one part, and moves as one: its leader is the least
+    # unknown that is on no second boundary, or the least of all
     members, index = np.unique(np.concatenate([first, second]), return_inverse=True)
     part = number_parts(len(members), *index.ravel().reshape(2, -1))
-    order = np.lexsort((members, np.isin(members, second), part))  # of every part the leader first
+    order = np.lexsort((members, np.isin(members, second), part))
     _, start = np.unique(part[order], return_index=True)
     leaders = members[order[start]][part]
     follows = leaders != members
     return Links(members[follows], leaders[follows])
 
 
-def _pairs(
+def _pair(
     tie: Tied, first: Nodes, second: Nodes, dimension: int, near: float
 ) -> tuple[Indices, Indices]:
-    """Return the unknowns of the first boundary, and those of the second that move alike.
+    """Return the unknowns (k,) of the first boundary, and those of the second that move alike.
 
     Args:
         tie: the boundaries and components.
@@ -119,6 +124,9 @@ def _pairs(
         second: nodes of the second one.
         dimension: d, components of a node.
         near: how far a partner may be from its place [m].
+
+    Raises:
+        InputError: boundaries that are not meshed alike, or share a node.
     """
     names = f"'{tie.first.name}' and '{tie.second.name}'"
     if len(first[0]) != len(second[0]) or not len(first[0]):
@@ -131,7 +139,7 @@ def _pairs(
             f"tied boundaries {names} share the node {describe_point(shared)}: tie boundaries "
             "without common nodes"
         )
-    from scipy.spatial import cKDTree
+    from scipy.spatial import cKDTree  # late: most bodies have no ties
 
     # a partner is the node next to where the first boundary, moved as a whole, has its node
     apart = second[1].mean(axis=0) - first[1].mean(axis=0)
@@ -143,7 +151,6 @@ def _pairs(
             "opposite it on the other: mesh both sides alike"
         )
     components = np.array(components_of("tied", tie.components, dimension))
-    return (
-        (first[0][:, None] * dimension + components).ravel(),
-        (second[0][partner][:, None] * dimension + components).ravel(),
-    )
+    own = first[0][:, None] * dimension + components
+    others = second[0][partner][:, None] * dimension + components
+    return own.ravel(), others.ravel()

@@ -1,6 +1,4 @@
-"""Say from which neighbours a node of a contact boundary takes its pressure.
-
-This is a node without a condition, and its pressure in pictures and fields.
+"""Say from which neighbours a contact node without a condition takes its pressure in pictures.
 
 Such a node is held, shared by both sides, or hardly covered: no reaction of its own tells the
 pressure there. The mean of its neighbours on the facets around it is right up to the size of a
@@ -35,25 +33,24 @@ class Borrowed:
         return np.asarray(self.shares @ space.at_nodes(self.lenders, nodal))
 
 
-def borrowed(space: Any, facets: Any, without: Indices, having: Indices) -> Borrowed | None:
-    """Return what nodes ``without`` pressure borrow of those ``having`` one. Collective.
-
-    A pressure here is one of their own. It is None where there are none of either. Both are numbers
-    of nodes of any rank, as this rank knows them.
+def borrow(space: Any, facets: Any, without: Indices, having: Indices) -> Borrowed | None:
+    """Return what nodes without a pressure of their own borrow of those with one. Collective.
 
     Args:
         space: the body's unknowns.
         facets: those of the contact.
-        without: numbers of nodes without pressure, as this rank knows them.
-        having: numbers of nodes with one.
+        without: numbers of nodes without pressure, of any rank, as this rank knows them.
+        having: the like of nodes with one, which counts where both name a node.
+
+    Returns:
+        what nodes of this rank borrow, or None where no node borrows.
     """
-    # A node has its condition on the rank that owns it: most boundaries end here, and nothing is
-    # gathered.
+    # a node has its condition on the rank that owns it: most boundaries end here, and nothing is
+    # gathered
     if not largest(space.comm, len(np.setdiff1d(without, having))):
         return None
-    asking, lending = (
-        np.unique(np.concatenate(from_each(space.comm, one))) for one in (without, having)
-    )
+    asking = np.unique(np.concatenate(from_each(space.comm, without)))
+    lending = np.unique(np.concatenate(from_each(space.comm, having)))
     asking = np.setdiff1d(asking, lending)
     rows = space.corners_of_facets(facets.indices)
     if not (len(asking) and len(lending)):
@@ -63,7 +60,8 @@ def borrowed(space: Any, facets: Any, without: Indices, having: Indices) -> Borr
     pairs = np.column_stack([np.repeat(rows, v, axis=1).ravel(), np.tile(rows, v).ravel()])
     pairs = pairs[np.isin(pairs[:, 0], asking) & np.isin(pairs[:, 1], lending)]
     pairs = np.unique(np.concatenate(from_each(space.comm, pairs)), axis=0)
-    pairs = pairs[space.blocks_of(pairs[:, 0]) >= 0] if len(pairs) else pairs
+    if len(pairs):
+        pairs = pairs[space.blocks_of(pairs[:, 0]) >= 0]
     numbers, row = np.unique(pairs[:, 0], return_inverse=True)
     shares = sp.csr_matrix(
         (np.ones(len(pairs)), (row.ravel(), np.searchsorted(lending, pairs[:, 1]))),
@@ -71,6 +69,6 @@ def borrowed(space: Any, facets: Any, without: Indices, having: Indices) -> Borr
     )
     # the mean of all neighbours
     count = np.asarray(shares.sum(axis=1)).ravel()
-    return Borrowed(
-        numbers, lending, sp.csr_matrix(sp.diags(1.0 / count) @ shares if len(count) else shares)
-    )
+    if len(count):
+        shares = sp.diags(1.0 / count) @ shares
+    return Borrowed(numbers, lending, sp.csr_matrix(shares))

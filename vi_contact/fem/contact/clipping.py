@@ -6,14 +6,15 @@ each cut keeps what is on the left of the line. Here one cut is made of all poly
 arrays.
 
 Polygons are (k, m, 2), corners anticlockwise; one with fewer corners repeats some, one that is cut
-away has no area.
+away has no area. So all polygons of an array have as many corners as the largest of them, and a
+repeated corner makes a side without length, which every function here passes over.
 """
 
 import numpy as np
 
 from ...core.algebra import Array, Indices, Mask
 
-SHORT = 1e-9  # of the longest side of a polygon: round-off of what was cut
+SHORT = 1e-9  # of the longest side of a polygon: a shorter one is round-off of what was cut
 
 
 def cut(polygons: Array, start: Array, along: Array) -> Array:
@@ -60,10 +61,17 @@ def sides(polygons: Array) -> Array:
     return np.where(length > SHORT * length.max(axis=1, keepdims=True), edges, 0.0)
 
 
-def overlaps(polygons: Array, others: Array) -> Array:
-    """Return what each polygon (k, m, 2) shares with another one (k, n, 2).
+def intersect(polygons: Array, others: Array) -> Array:
+    """Return what each polygon shares with another one.
 
     All sides of the other one cut in turn; a side without length cuts nothing.
+
+    Args:
+        polygons: (k, m, 2) convex polygons [m].
+        others: (k, n, 2) one for each of them.
+
+    Returns:
+        (k, c, 2) convex polygons.
     """
     edges = sides(others)
     for edge in range(others.shape[1]):
@@ -71,7 +79,7 @@ def overlaps(polygons: Array, others: Array) -> Array:
     return polygons
 
 
-def without(polygons: Array, others: Array, least: Array) -> tuple[Indices, Array]:
+def subtract(polygons: Array, others: Array, least: Array) -> tuple[Indices, Array]:
     """Return the parts of each polygon that are outside of another one.
 
     Args:
@@ -84,23 +92,29 @@ def without(polygons: Array, others: Array, least: Array) -> tuple[Indices, Arra
     """
     owner = np.arange(len(polygons))
     inside = polygons
+    owners = []
     parts = []
     # each side of the other one cuts off what is on its right; the next side cuts the rest
     for start, along in zip(others.swapaxes(0, 1), sides(others).swapaxes(0, 1), strict=True):
         outside = cut(inside, start + along, -along)
-        # not the sides between repeated corners
-        kept = (areas(outside) > least) & along.any(axis=1)
-        parts.append((owner[kept], outside[kept]))
+        # a side between repeated corners cuts nothing off
+        used = (areas(outside) > least) & along.any(axis=1)
+        owners.append(owner[used])
+        parts.append(outside[used])
         inside = cut(inside, start, along)
-    return np.concatenate([part[0] for part in parts]), stacked([part[1] for part in parts])
+    return np.concatenate(owners), stack(parts)
 
 
-def stacked(parts: list[Array]) -> Array:
-    """Return all polygons of the parts, of as many corners as the largest has."""
+def stack(parts: list[Array]) -> Array:
+    """Return all polygons of the parts (k, m, 2), with as many corners as the largest has.
+
+    The others repeat their last corner.
+    """
     width = max(part.shape[1] for part in parts)
-    return np.concatenate(
-        [np.pad(part, ((0, 0), (0, width - part.shape[1]), (0, 0)), "edge") for part in parts]
-    )
+    padded = []
+    for part in parts:
+        padded.append(np.pad(part, ((0, 0), (0, width - part.shape[1]), (0, 0)), "edge"))
+    return np.concatenate(padded)
 
 
 def areas(polygons: Array) -> Array:
@@ -109,15 +123,15 @@ def areas(polygons: Array) -> Array:
     return 0.5 * cross(spokes[:, :-1], spokes[:, 1:]).sum(axis=1)
 
 
-def cross(one: Array, two: Array) -> Array:
-    """Return the products one_x two_y - one_y two_x of plane vectors (..., 2)."""
-    return np.asarray(one[..., 0] * two[..., 1] - one[..., 1] * two[..., 0])
+def cross(first: Array, second: Array) -> Array:
+    """Return the products first_x second_y - first_y second_x of plane vectors (..., 2)."""
+    return np.asarray(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0])
 
 
 def turns(polygons: Array) -> Array:
-    """Return twice the area (k, m) of the triangle at each corner.
+    """Return twice the signed area (k, m) [m²] of the triangle at each corner with both neighbours.
 
-    It is of one sign on convex polygons.
+    All are positive on a convex polygon whose corners are anticlockwise.
     """
     edges = np.roll(polygons, -1, axis=1) - polygons
     return cross(np.roll(edges, 1, axis=1), edges)
@@ -139,10 +153,15 @@ def triangles(polygons: Array) -> tuple[Indices, Array]:
 
 
 def rule(n: int) -> tuple[Array, Array]:
-    """Return (barycentric coordinates (n², 3), weights (n²)) of a rule on a triangle.
+    """Return a rule that integrates degree 2n - 2 exactly over a triangle of area 1.
 
-    They integrate degree 2n - 2 exactly over a triangle of area 1: Gauss points of a square of
-    which one side is drawn together.
+    These are Gauss points of a square of which one side is drawn together.
+
+    Args:
+        n: points a way.
+
+    Returns:
+        (n², 3) barycentric coordinates, and (n²,) weights, which add up to one.
     """
     x, w = np.polynomial.legendre.leggauss(n)
     # from (-1, 1) to (0, 1)

@@ -1,7 +1,4 @@
-"""Count the nodes of a contact boundary by what became of them.
-
-This is the `Census` of a contact surface.
-"""
+"""Count the nodes of a contact boundary by what became of them: the `Census` of a surface."""
 
 import logging
 from collections.abc import Mapping
@@ -31,7 +28,9 @@ def census_on_ranks(
         name=name,
         nodes=round(total(comm, len(nodes.numbers))),
         points=round(total(comm, points)),
-        places=_filled({kind: _gathered(comm, nodes.pick(mask)) for kind, mask in kinds.items()}),
+        places=_drop_empty(
+            {kind: _gather_points(comm, nodes.pick(mask)) for kind, mask in kinds.items()}
+        ),
     )
 
 
@@ -45,24 +44,21 @@ def census_of_all(name: str, nodes: Nodes, kinds: Mapping[str, Mask], points: in
         points: number of contact conditions on all ranks.
     """
     places = {kind: nodes.points[mask] for kind, mask in kinds.items()}
-    return Census(name, len(nodes.numbers), points, _filled(places))
+    return Census(name, len(nodes.numbers), points, _drop_empty(places))
 
 
 def tell(comm: Comm, census: Census) -> None:
-    """Log, on rank 0, what became of the nodes of a boundary.
-
-    It is told where not all are plain contact points.
-    """
+    """Log, on rank 0, what became of the nodes of a boundary, unless all are contact points."""
     if census.places and comm.rank == 0:
         log.info("contact on '%s': %s", census.name, census.in_words())
 
 
-def _gathered(comm: Comm, nodes: Nodes) -> Array:
-    """Return coordinates of the nodes of all ranks, by their numbers. Collective."""
+def _gather_points(comm: Comm, nodes: Nodes) -> Array:
+    """Return the points (k, d) of the nodes of all ranks, by their numbers. Collective."""
     numbers, points = gather_rows(comm, nodes.numbers, nodes.points)
     return np.asarray(points[np.argsort(numbers)])
 
 
-def _filled(places: Mapping[str, Array]) -> dict[str, Array]:
-    """Return the kinds of which there are nodes."""
+def _drop_empty(places: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the kinds of which there are nodes, and where these are."""
     return {kind: points for kind, points in places.items() if len(points)}

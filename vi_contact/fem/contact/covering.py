@@ -1,6 +1,4 @@
-"""Let whole facets carry what is covered of a facet beside them.
-
-This is at the edge of what side 1 has in front of it.
+"""Let whole facets carry what is covered of facets at the edge of what side 1 has in front of it.
 
 A node t of side 1 beyond that edge has but a share of its facets in front of side 2. A multiplier
 of its own would be that of a sliver: its reaction over its weight is no pressure of the interface,
@@ -19,6 +17,10 @@ so that sum_k psi_k = 1, ∫ psi_k = D_k and ∫ psi_k x = D_k x_k still: a unif
 through exactly, forces and moments of both sides are in balance, and every pressure is one over a
 patch that is covered. Badia, Verdugo and Martín, Comput. Methods Appl. Mech. Engrg. 336 (2018),
 533-553 carry displacements on in the same way.
+
+Words: a facet is *covered* by its share in front of side 2, and *whole* where none of its nodes is
+carried; a node is *carried* by the nodes k of a whole facet, which *carries* it. ``couple`` decides
+who carries whom; ``mortar`` and ``mortar_in_space`` measure what is covered and assemble.
 """
 
 from collections.abc import Callable
@@ -29,7 +31,7 @@ import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, Mask
 
-# of a node's facets beyond the edge, weighted with its function: less of it is carried (CHOSEN)
+# CHOSEN: a node beyond the edge with a smaller covered share of its facets is carried
 LEAST_SHARE = 0.5
 LEAST_COVERED = 1e-3  # of a facet: less is no contact where no other facet carries it
 LEAST_WEIGHT = 0.25  # of the weight that a node has without what it carries
@@ -65,9 +67,9 @@ class Covered:
 
     @property
     def share(self) -> Array:
-        """Return the covered share (m,) of the facets of each node beyond the edge.
+        """Return the covered share (m,) of the facets of each node, weighted with its function.
 
-        It is 1 for all other nodes.
+        It is 1 for nodes that are in front of side 2 themselves: only those beyond the edge count.
         """
         full = self.sums(self.full)
         share = self.sums(self.weights) / np.where(full > 0.0, full, 1.0)
@@ -90,12 +92,14 @@ class Carried:
     used: Mask
 
 
-def carried_by(covered: Covered, asked: Mask) -> Carried:
-    """Return the nodes that are carried of those ``asked`` for (m,).
+def choose_carriers(covered: Covered, asked: Mask) -> Carried:
+    """Choose which nodes are carried, and by which facets: those whose middle is the nearest.
 
-    They are carried by the facets whose middle is the nearest.
+    No node is carried where there is no whole facet to carry it, and none of a facet at a weld.
 
-    None is where there is no whole facet to carry them, and none of a facet at a weld.
+    Args:
+        covered: what is covered of side 1.
+        asked: (m,) mask of the nodes that should be carried.
     """
     facets = covered.facets
     common = covered.common
@@ -119,12 +123,13 @@ def carried_by(covered: Covered, asked: Mask) -> Carried:
     from scipy.spatial import cKDTree  # late: it takes a while
 
     by = facets.copy()
-    by[some] = facets[whole[cKDTree(covered.middles[whole]).query(covered.middles[some])[1]]]
+    _, nearest = cKDTree(covered.middles[whole]).query(covered.middles[some])
+    by[some] = facets[whole[nearest]]
     return Carried(nodes, by, used)
 
 
 def extrapolation(corners: Array, points: Array) -> Array:
-    """Return E, what each of the corners of facets counts at points, linearly.
+    """Return E: the shares of the corners of facets in a linear function at points, also beyond.
 
     Args:
         corners: (k, v, c) of facets, c coordinates [m].
@@ -144,18 +149,20 @@ def extrapolation(corners: Array, points: Array) -> Array:
     return np.asarray(wanted @ np.linalg.pinv(known))
 
 
-def overloaded(covered: Covered, carried: Carried, weights: Array) -> Mask:
-    """Return the carried nodes (m,) that leave too little weight to a node which carries them.
-
-    It is too little of its own weight, and of these nodes the one with the largest weight for each.
+def find_overloading(covered: Covered, carried: Carried, weights: Array) -> Mask:
+    """Find carried nodes that leave too little weight to a node which carries them.
 
     A linear function that is positive at one node of a facet and beyond is negative at the other:
-    where much is carried far this one would be pulled.
+    where much is carried far, this other node has less weight, and its pressure would pull. It
+    needs ``LEAST_WEIGHT`` of its own weight.
 
     Args:
         covered: what is covered of side 1.
         carried: which nodes are carried.
-        weights: (m,) with what is carried [m], [m²].
+        weights: (m,) D of all nodes, with what is carried [m], [m²].
+
+    Returns:
+        (m,) mask: for each node with too little weight the heaviest of those it carries.
     """
     own = covered.sums(covered.weights)
     light = ~(carried.nodes | covered.common) & (own > 0.0) & (weights < LEAST_WEIGHT * own)
@@ -175,7 +182,7 @@ class Coupled:
     Attributes:
         D: (m,) ∫ psi of each node [m], [m²].
         M: (m, n) ∫ psi_s phi_j [m], [m²].
-        overlap: (m,) what polygons of one curve may have at each node [m].
+        overlap: (m,) by how much polygons of one curve may overlap at each node [m] (``curves``).
         carried: (m,) nodes that others carry, which have no row in either.
         share: (m,) covered share of the facets of each node.
     """
@@ -187,20 +194,22 @@ class Coupled:
     share: Array
 
 
-def coupled(
-    covered: Covered, assembled: Callable[[Carried], tuple[Array, sp.csr_matrix, Array]]
+def couple(
+    covered: Covered, assemble: Callable[[Carried], tuple[Array, sp.csr_matrix, Array]]
 ) -> Coupled:
-    """Return the coupling in which whole facets carry the nodes that have little covered.
+    """Couple two sides, with whole facets that carry the nodes with little covered where they can.
 
-    They do so as far as they can.
+    Args:
+        covered: what is covered of side 1.
+        assemble: makes D, M and the overlap of ``Coupled`` for nodes that are carried so.
     """
     share = covered.share
     asked = share < LEAST_SHARE
     # carry all, then take back what would leave a carrying node too little weight, until none does
     while True:
-        carried = carried_by(covered, asked)
-        D, M, overlap = assembled(carried)
-        too_much = overloaded(covered, carried, D)
+        carried = choose_carriers(covered, asked)
+        D, M, overlap = assemble(carried)
+        too_much = find_overloading(covered, carried, D)
         if not too_much.any():
             return Coupled(D, M, overlap, carried.nodes, share)
         asked = carried.nodes & ~too_much

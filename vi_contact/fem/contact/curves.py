@@ -1,6 +1,4 @@
-"""Say by how much polygons, or polyhedra, of one curved face may overlap.
-
-Two of them may although the face does not.
+"""Say by how much two meshes of one curved face may overlap, although the face itself does not.
 
 Facets leave a curve of radius R by up to h²/(8R). Nodes of side 1 lie on the curve, and so do those
 of side 2; what a mean gap may lack is how far the facets of side 2 are from the function that is
@@ -30,11 +28,10 @@ FLAT = 1e-2
 def curvatures(corners: Array, facets: Indices, normals: Array) -> Array:
     """Return the curvature H (k, d, d) [1/m] of a side at each of its facets.
 
-    It is positive where the side bulges outwards.
-
-    The normal of a face at a node is the mean of those of the facets that turn by less than the
-    feature angle; H is the fit of normals to nodes. Facets at the rim of a face see half of the
-    turning only, so that theirs is doubled.
+    It is positive where the side bulges outwards: normals turn by H x over a way x. The normal of a
+    face at a node is the mean of those of the facets that turn by less than the feature angle; H is
+    the fit of normals to nodes. Facets at the rim of a face see half of the turning only, so that
+    theirs is doubled.
 
     Args:
         corners: (k, v, d) of the facets.
@@ -66,22 +63,22 @@ def left_out(H: Array, weights: Array, corners: Array) -> Array:
     )
 
 
-def may_overlap(H: Array, one: tuple[Array, Array], two: tuple[Array, Array]) -> Array:
-    """Return by how much (k,) [m] pieces of facets may overlap.
+def may_overlap(H: Array, facet1: tuple[Array, Array], facet2: tuple[Array, Array]) -> Array:
+    """Return by how much (k,) [m] pieces of facets may overlap: the most at their points.
 
-    This is the most at their points, with the margin.
+    It is ``MARGIN`` times |delta|, as the head of this module states it.
 
     Args:
         H: (k, d, d) of side 2 at each piece.
-        one: shape functions (k, p, v) at the points and corners (k, v, d) of the facets of side 1.
-        two: the same of the facets of side 2.
+        facet1: shape functions (k, p, v) at the points, and corners (k, v, d), of facets of side 1.
+        facet2: the same of the facets of side 2.
     """
-    delta = 0.5 * (left_out(H, *two) - left_out(H, *one))
+    delta = 0.5 * (left_out(H, *facet2) - left_out(H, *facet1))
     return np.asarray(MARGIN * np.abs(delta).max(axis=1, initial=0.0))
 
 
 def _nodal_normals(facets: Indices, normals: Array) -> tuple[Array, Mask]:
-    """Return normals of smooth faces at the nodes of their facets.
+    """Return normals of smooth faces at the nodes of facets, and which facets are at a rim.
 
     Args:
         facets: (k, v) nodes.
@@ -115,12 +112,16 @@ def _nodal_normals(facets: Indices, normals: Array) -> tuple[Array, Mask]:
 
 
 def _at_border(facets: Indices) -> Mask:
-    """Return which facets have a node on the outline of their side.
+    """Return a mask (k,) of the facets that have a node on the outline of their side in space.
 
-    In space this is an edge of one facet only.
+    An edge of one facet only is on the outline. In the plane the outline are nodes of one facet
+    only, which ``_nodal_normals`` knows already.
+
+    Args:
+        facets: (k, v) nodes, in order round each facet.
     """
     if facets.shape[1] == 2:
-        return np.zeros(len(facets), dtype=bool)  # there a node of one facet only, which is alone
+        return np.zeros(len(facets), dtype=bool)
     edges = np.sort(np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     unique, place, count = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
     border = np.unique(unique[count == 1])

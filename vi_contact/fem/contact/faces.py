@@ -1,11 +1,12 @@
-"""Split a contact boundary into faces.
-
-Where it turns by more than a feature angle, nodes have one normal a face.
+"""Split a contact boundary into faces where it turns by more than a feature angle.
 
 Facets round a node are one face there as long as each turns by no more than the angle from another
 one of them. A smooth node has one face, a node at an edge two, at a corner in space three. Normal
-and weight of a face at a node are those of the facets of this face. Facets are gathered on every
-rank only round nodes where they may turn so far.
+and weight of a face at a node are those of the facets of this face.
+
+The steps: ``gather_boundary`` brings the facets round nodes where they may turn so far to every
+rank; ``Boundary.corner_faces`` numbers the faces round each node; ``split_at_corners`` makes one
+row for each face of a node, with the integrals of ``integrate_nodal`` over that face alone.
 """
 
 import logging
@@ -52,10 +53,15 @@ class Boundary:
     place: Indices
 
     def corner_faces(self, angle: float) -> Indices:
-        """Return the numbers (k, v) of the faces of each facet round each of its nodes.
+        """Return the number (k, v) of the face that each facet is of round each of its nodes.
 
-        All nodes are taken apart.
+        Every node is looked at by itself, so that a facet has other numbers at other nodes.
+
+        Args:
+            angle: that up to which facets round a node are one face [rad].
         """
+        # the things to be joined are corners, pairs of a facet and a node of it; those of one node
+        # are joined where their normals are close
         node = self.vertices.ravel()
         normals = self.normals.reshape(-1, self.normals.shape[2])
         order = np.argsort(node, kind="stable")
@@ -65,19 +71,26 @@ class Boundary:
             same = node[order[:-apart]] == node[order[apart:]]
             first = order[:-apart][same]
             second = order[apart:][same]
-            close = _turn(normals[first], normals[second]) <= angle * (1.0 + 1e-9)
+            close = _angles(normals[first], normals[second]) <= angle * (1.0 + 1e-9)
             links.append(np.stack([first[close], second[close]]))
         pairs = np.concatenate([np.zeros((2, 0), dtype=np.int64), *links], axis=1)
         return number_parts(len(node), *pairs).reshape(self.vertices.shape)
 
     def faces(self, angle: float) -> Indices:
-        """Return the number (k,) of the face of each facet over the whole boundary."""
+        """Return the number (k,) of the face of each facet over the whole boundary.
+
+        Args:
+            angle: that up to which facets round a node are one face [rad].
+        """
+        # a facet, 0 to k - 1, is linked to the faces that it is of at its nodes, from k on
         k, v = self.vertices.shape
-        of_facet = np.repeat(np.arange(k), v), k + self.corner_faces(angle).ravel()
-        return np.unique(number_parts(k + k * v, *of_facet)[:k], return_inverse=True)[1].ravel()
+        facet = np.repeat(np.arange(k), v)
+        part = number_parts(k + k * v, facet, k + self.corner_faces(angle).ravel())
+        _, number = np.unique(part[:k], return_inverse=True)
+        return number.ravel()
 
 
-def checked_angle(owner: str, value: Any) -> float:
+def check_angle(owner: str, value: Any) -> float:
     """Return the feature angle as a float; InputError for what is no angle above 0 and up to pi."""
     angle = number(owner, "feature_angle", value, positive=True, unit="radians")
     if angle > np.pi:
@@ -87,8 +100,8 @@ def checked_angle(owner: str, value: Any) -> float:
     return angle
 
 
-def boundary(space: FemSpace, facets: Facets, *, beyond: float | None = None) -> Boundary:
-    """Gather the facets of a group. Collective.
+def gather_boundary(space: FemSpace, facets: Facets, *, beyond: float | None = None) -> Boundary:
+    """Gather the facets of a group on every rank. Collective.
 
     Args:
         space: the body's unknowns.
@@ -100,15 +113,17 @@ def boundary(space: FemSpace, facets: Facets, *, beyond: float | None = None) ->
     local = np.asarray(facets.indices)
     geometry = compat.entities_to_geometry(mesh, mesh.topology.dim - 1, local)
     vertices = space.corners_of_facets(local)
-    plane = outward(mesh, local, geometry)
+    # normals at the nodes of this rank's facets
+    plane = outward_normals(mesh, local, geometry)
     normals = np.repeat(plane[:, None], vertices.shape[1], axis=1)
     if is_curved(mesh) and space.dimension > 1:
-        normals = _curved(space, local, plane)[:, : vertices.shape[1]]
+        normals = _compute_curved_normals(space, local, plane)[:, : vertices.shape[1]]
     if beyond is not None:
-        kept = np.isin(vertices, _turning(space, vertices, normals, beyond)).any(axis=1)
-        local = local[kept]
-        vertices = vertices[kept]
-        normals = normals[kept]
+        turning = _find_turning(space, vertices, normals, beyond)
+        near = np.isin(vertices, turning).any(axis=1)
+        local = local[near]
+        vertices = vertices[near]
+        normals = normals[near]
     # those of all ranks, each once, with the nodes of a facet in the order of their numbers
     rows, normals = gather_rows(space.comm, vertices, normals)
     if not len(rows):
@@ -122,11 +137,12 @@ def boundary(space: FemSpace, facets: Facets, *, beyond: float | None = None) ->
     return Boundary(unique, normals[first], local, order[np.searchsorted(known[order], own)])
 
 
-def _turning(space: FemSpace, vertices: Indices, normals: Array, angle: float) -> Indices:
-    """Return the numbers of the nodes, the same on every rank, at which facets may turn.
+def _find_turning(space: FemSpace, vertices: Indices, normals: Array, angle: float) -> Indices:
+    """Return the nodes at which facets may turn by more, the same on every rank. Collective.
 
-    Their facets have normals in too large a box for all to be within the angle of one another. Of
-    nodes that other ranks own every rank tells the box of those facets that it holds.
+    Two unit vectors that turn by less than the angle are less than 2 sin(angle / 2) apart: where
+    the box round the normals at a node is smaller, none turns by more. Of nodes that other ranks
+    own every rank tells the box of those facets that it holds.
 
     Args:
         space: the body's unknowns.
@@ -135,17 +151,22 @@ def _turning(space: FemSpace, vertices: Indices, normals: Array, angle: float) -
         angle: [rad].
     """
     every = normals.reshape(-1, normals.shape[2])
-    numbers, low, high = _boxes(vertices.ravel(), every, every)
+    numbers, low, high = _bound_rows(vertices.ravel(), every, every)
     away = ~np.isin(numbers, space.nodes)
-    others = gather_rows(space.comm, numbers[away], low[away], high[away])
-    pairs: Any = zip((numbers, low, high), others, strict=True)
-    numbers, low, high = _boxes(*map(np.concatenate, pairs))
+    other_numbers, other_low, other_high = gather_rows(
+        space.comm, numbers[away], low[away], high[away]
+    )
+    numbers, low, high = _bound_rows(
+        np.concatenate([numbers, other_numbers]),
+        np.concatenate([low, other_low]),
+        np.concatenate([high, other_high]),
+    )
     wide = np.linalg.norm(high - low, axis=1) > 2.0 * np.sin(0.5 * angle)
     return np.unique(np.concatenate(from_each(space.comm, numbers[wide])))
 
 
-def _boxes(nodes: Indices, low: Array, high: Array) -> tuple[Indices, Array, Array]:
-    """Return each node once, and the least and largest values of its rows.
+def _bound_rows(nodes: Indices, low: Array, high: Array) -> tuple[Indices, Array, Array]:
+    """Return each node once, and the box round its rows: the least and the largest values (k, d).
 
     Args:
         nodes: (n,) the node of each row.
@@ -163,8 +184,8 @@ def _boxes(nodes: Indices, low: Array, high: Array) -> tuple[Indices, Array, Arr
     )
 
 
-def outward(mesh: Any, facets: Any, geometry: Any) -> Array:
-    """Return outward unit normals (k, d) of local facets.
+def outward_normals(mesh: Any, facets: Any, geometry: Any) -> Array:
+    """Return outward unit normals (k, d) of the planes of local facets.
 
     Args:
         mesh: the DOLFINx mesh.
@@ -178,12 +199,11 @@ def outward(mesh: Any, facets: Any, geometry: Any) -> Array:
     cell_of = mesh.topology.connectivity(mesh.topology.dim - 1, mesh.topology.dim)
     cells = cell_of.array[cell_of.offsets[facets]]  # the first cell of each
     inside = mesh.geometry.x[compat.geometry_dofmap(mesh)[cells]][:, :, :d].mean(axis=1)
-    return np.asarray(
-        np.where(np.sum((middle - inside) * normals, axis=1)[:, None] < 0.0, -normals, normals)
-    )
+    inward = np.sum((middle - inside) * normals, axis=1)[:, None] < 0.0
+    return np.asarray(np.where(inward, -normals, normals))
 
 
-def _curved(space: FemSpace, facets: Any, plane: Array) -> Array:
+def _compute_curved_normals(space: FemSpace, facets: Any, plane: Array) -> Array:
     """Return outward unit normals (k, n, d) at the nodes of curved facets.
 
     At a vertex it is at right angles to the tangents of its edges, at mid-points the mean of those
@@ -194,56 +214,67 @@ def _curved(space: FemSpace, facets: Any, plane: Array) -> Array:
         facets: (k,) local numbers.
         plane: (k, d) outward normals of the planes of their vertices.
     """
-    x = space.mesh.geometry.x[compat.dof_to_node(space.V)[facet_rows(space.V, facets)]][
-        :, :, : space.dimension
-    ]
+    nodes = compat.dof_to_node(space.V)[facet_rows(space.V, facets)]
+    x = space.mesh.geometry.x[nodes][:, :, : space.dimension]
     around = MID_POINTS[x.shape[1]]
     corners = x.shape[1] - len(around)
     normals = np.empty_like(x)
     for p in range(corners):
         # of each edge p-q with the mid-point m, the tangent at p is 4 x_m - 3 x_p - x_q
-        edges = [
-            (corners + i, sum(ends) - p)
-            for i, ends in enumerate(around)
-            if len(ends) == 2 and p in ends
-        ]
-        along = np.stack([4.0 * x[:, m] - 3.0 * x[:, p] - x[:, q] for m, q in edges], axis=1)
+        tangents = []
+        for i, ends in enumerate(around):
+            if len(ends) == 2 and p in ends:
+                m = corners + i
+                q = sum(ends) - p
+                tangents.append(4.0 * x[:, m] - 3.0 * x[:, p] - x[:, q])
+        along = np.stack(tangents, axis=1)
         normal = np.linalg.svd(along)[2][:, -1]
         normals[:, p] = np.where(np.sum(normal * plane, axis=1)[:, None] < 0.0, -normal, normal)
-    for i, one in enumerate(around):
-        normals[:, corners + i] = normals[:, one].mean(axis=1)
+    for i, vertices in enumerate(around):
+        normals[:, corners + i] = normals[:, vertices].mean(axis=1)
     return np.asarray(normals / np.linalg.norm(normals, axis=2)[:, :, None])
 
 
-def _turn(one: Array, other: Array) -> Array:
-    """Return the angles (k,) between unit vectors (k, d) [rad]."""
+def _angles(first: Array, second: Array) -> Array:
+    """Return the angles (k,) between unit vectors (k, d) [rad], exact for small ones too."""
     return np.asarray(
-        2.0 * np.arctan2(np.linalg.norm(one - other, axis=1), np.linalg.norm(one + other, axis=1))
+        2.0
+        * np.arctan2(np.linalg.norm(first - second, axis=1), np.linalg.norm(first + second, axis=1))
     )
 
 
-def integrals(space: FemSpace, indices: Any) -> Array:
-    """Integrate phi_i and phi_i n, (owned nodes, 1 + d), over local facets. Collective.
+def integrate_nodal(space: FemSpace, indices: Any) -> Array:
+    """Integrate phi_i and phi_i n over facets, (owned nodes, 1 + d) [m], [m²]. Collective.
 
-    In a hierarchy they are those of the vertices, which are of first order.
+    In a hierarchy phi_i are those of the vertices, of first order, and mid-points have zeros.
+
+    Args:
+        space: the body's unknowns.
+        indices: local facets.
     """
     mesh = space.mesh
     d = space.dimension
     ds = compat.measure(mesh, mesh.topology.dim - 1, indices)
-    V, blocks = (space.V, slice(None)) if space.hierarchy is None else space.hierarchy.vertices
+    V: Any = space.V
+    blocks: Any = slice(None)
+    if space.hierarchy is not None:
+        V, blocks = space.hierarchy.vertices
+
+    # of a vector-valued test function with the shape functions as components: ∫ phi_i is in each of
+    # them, ∫ phi_i n_c in the c-th one
     v = ufl.TestFunction(V)
-    one = compat.assemble_vector(
-        compat.compile_form(sum(v[c] for c in range(d)) * ds)
-    ).array_r.reshape(-1, d)
-    normal = compat.assemble_vector(
-        compat.compile_form(ufl.inner(ufl.FacetNormal(mesh), v) * ds)
-    ).array_r
+    weight_form = compat.compile_form(sum(v[c] for c in range(d)) * ds)
+    weights = compat.assemble_vector(weight_form).array_r.reshape(-1, d)
+    normal_form = compat.compile_form(ufl.inner(ufl.FacetNormal(mesh), v) * ds)
+    normals = compat.assemble_vector(normal_form).array_r.reshape(-1, d)
     nodal = np.zeros((len(space.nodes), 1 + d))
-    nodal[blocks] = np.column_stack([one[:, 0], normal.reshape(-1, d)])
+    nodal[blocks] = np.column_stack([weights[:, 0], normals])
     return nodal
 
 
-def split(space: FemSpace, around: Boundary, nodes: Nodes, angle: float) -> tuple[Nodes, Indices]:
+def split_at_corners(
+    space: FemSpace, around: Boundary, nodes: Nodes, angle: float
+) -> tuple[Nodes, Indices]:
     """Split nodes at corners into one for each face, with its normal and weight. Collective.
 
     Args:
@@ -253,7 +284,8 @@ def split(space: FemSpace, around: Boundary, nodes: Nodes, angle: float) -> tupl
         angle: that up to which facets round a node are one face [rad].
 
     Returns:
-        nodes, and a facet of the face of each, -1 elsewhere.
+        nodes, those of one node in a row, and (nodes,) a facet of the face of each, -1 for nodes
+        with one face.
     """
     if not len(around.vertices):
         return nodes, np.full(len(nodes.numbers), -1)
@@ -274,24 +306,25 @@ def split(space: FemSpace, around: Boundary, nodes: Nodes, angle: float) -> tupl
     repeated = nodes.pick(np.repeat(np.arange(len(times)), times))
     among = np.arange(times.sum()) - np.repeat(np.cumsum(times) - times, times)
     pair = np.where(np.repeat(ends > starts, times), np.repeat(starts, times) + among, -1)
+    # normals and weights of these from their faces
     double = pair >= 0
-    values = _of_faces(space, around, labels, pairs)[pair]
+    values = _integrate_faces(space, around, labels, pairs)[pair]
     unit = values[:, 1:] / np.linalg.norm(values[:, 1:], axis=1)[:, None]
     normals = np.where(double[:, None], in_symmetry_planes(unit, repeated.held), repeated.normals)
-    facet = np.unique(labels, return_index=True)[1] // labels.shape[1]
+    _, corner = np.unique(labels, return_index=True)
+    facet = corner // labels.shape[1]
     split_nodes = replace(
         repeated, normals=normals, weights=np.where(double, values[:, 0], repeated.weights)
     )
     return split_nodes, np.where(double, facet[pairs[pair, 1]], -1)
 
 
-def _of_faces(space: FemSpace, around: Boundary, labels: Indices, pairs: Indices) -> Array:
-    """Return ``integrals`` (pairs, 1 + d) at corner nodes over one of their faces.
+def _integrate_faces(space: FemSpace, around: Boundary, labels: Indices, pairs: Indices) -> Array:
+    """Return ``integrate_nodal`` (pairs, 1 + d) at nodes over one of their faces. Collective.
 
-    They are those for pairs of node and face.
-
-    Facets are sorted into classes, in which those at one node are all of one face, and each class
-    is integrated.
+    An integral over each face by itself would be one assembly for each of many. Facets are sorted
+    into few classes instead, in which those at one node are all of one face, and each class is
+    integrated.
 
     Args:
         space: the body's unknowns.
@@ -300,13 +333,13 @@ def _of_faces(space: FemSpace, around: Boundary, labels: Indices, pairs: Indices
         pairs: (p, 2) node and face.
     """
     corners = np.unique(pairs[:, 0])
-    classes = _classes(around.vertices, labels, corners)
+    classes = _classify(around.vertices, labels, corners)
     row_of = np.full(int(labels.max()) + 1, -1)
     row_of[pairs[:, 1]] = np.arange(len(pairs))
     total = np.zeros((len(pairs), 1 + space.dimension))
     for chosen in range(int(classes.max()) + 1):
         local = np.asarray(around.local)[classes[around.place] == chosen]
-        values = space.at_nodes(corners, integrals(space, local))
+        values = space.at_nodes(corners, integrate_nodal(space, local))
         inside = classes == chosen
         rows = np.unique(row_of[labels[inside]])
         rows = rows[rows >= 0]
@@ -314,7 +347,7 @@ def _of_faces(space: FemSpace, around: Boundary, labels: Indices, pairs: Indices
     return total
 
 
-def _classes(vertices: Indices, labels: Indices, corners: Indices) -> Indices:
+def _classify(vertices: Indices, labels: Indices, corners: Indices) -> Indices:
     """Return the class (k,) of every facet at a corner, -1 for others.
 
     Facets of different faces at a node differ in class: facets are coloured one after the other,
@@ -327,18 +360,16 @@ def _classes(vertices: Indices, labels: Indices, corners: Indices) -> Indices:
     """
     classes = np.full(len(vertices), -1, dtype=np.int64)
     at_corner = np.isin(vertices, corners)
+    # node -> facets there that have a class, and their faces
     around: dict[int, list[tuple[int, int]]] = {int(node): [] for node in corners}
     for facet in np.flatnonzero(at_corner.any(axis=1)):
         own = [
             (int(vertices[facet, i]), int(labels[facet, i]))
             for i in np.flatnonzero(at_corner[facet])
         ]
-        taken = {
-            int(classes[other])
-            for node, label in own
-            for other, face in around[node]
-            if face != label
-        }
+        taken = set()
+        for node, label in own:
+            taken |= {int(classes[other]) for other, face in around[node] if face != label}
         classes[facet] = next(c for c in range(len(taken) + 1) if c not in taken)
         for node, label in own:
             around[node].append((int(facet), label))
@@ -346,12 +377,14 @@ def _classes(vertices: Indices, labels: Indices, corners: Indices) -> Indices:
 
 
 def in_symmetry_planes(normals: Array, held: Mask) -> Array:
-    """Return normals (k, d) without the prescribed components of their nodes.
-
-    This is done where it turns them by little.
+    """Return normals (k, d) without the prescribed components, where that turns them by little.
 
     On a symmetry plane the true normal lies in the plane; that of the facets on one side of it
     leans to that side.
+
+    Args:
+        normals: (k, d) unit vectors.
+        held: (k, d) which components of the nodes are prescribed.
     """
     inside = np.where(held, 0.0, normals)
     length = np.linalg.norm(inside, axis=1)[:, None]
@@ -373,7 +406,7 @@ def tell_corners(space: FemSpace, name: str, nodes: Nodes, slots: Indices, angle
     numbers, points = gather_rows(space.comm, slots[rows], nodes.points[rows])
     if space.comm.rank == 0 and len(numbers):
         some = points[np.argsort(numbers)[:NAMED]]
-        places = ", ".join(map(describe_point, some))
+        places = ", ".join(describe_point(point) for point in some)
         if len(numbers) > NAMED:
             places += ", …"
         log.info(

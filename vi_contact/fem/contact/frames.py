@@ -1,6 +1,4 @@
-"""Turn contact nodes to their frames, and conditions with them.
-
-These are the bases T and R of a `ContactSurface`.
+"""Turn contact nodes to their frames, and conditions with them: T and R of a `ContactSurface`.
 
 A condition is a node, a contact direction and, between two bodies, what the node faces. Each node
 has one frame Q, with the directions of all its conditions among its vectors, and its unknowns are û
@@ -29,7 +27,7 @@ from ...core.surfaces import (
 )
 from ..mesh.nodal_space import NodalSpace
 from .borrowing import Borrowed
-from .nodes import Nodes, asked, joined_nodes
+from .nodes import Nodes, ask_alike, join_nodes
 
 # least singular value of a node's directions: two that turn by 0.8° (CHOSEN; T has 1 over it)
 INDEPENDENT = 0.01
@@ -71,9 +69,11 @@ class NodalConditions:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class FemSurface(ContactSurface):
-    """Hold a contact surface that remembers what it was made of.
+    """Hold a contact surface that remembers what it was made of, so that it can be joined.
 
-    So it can be joined with others.
+    Attributes:
+        space: what the unknowns mean.
+        parts: the conditions, one part after the other.
     """
 
     space: NodalSpace = field(repr=False)
@@ -89,7 +89,8 @@ class NodalFrames:
         numbers: (k,) nodes.
         blocks: (k, d, d) frames Q, vectors as columns.
         turns: (k, d, d) Q⁻ᵀ.
-        place, column: (m,) node and column of each condition.
+        place: (m,) row of the node of each condition among ``numbers``.
+        column: (m,) column of Q that is the direction of each condition.
         double: (k,) nodes with several conditions.
         oblique: whether some node has directions that are not at right angles.
         rubs: (m, d-1) tangential vectors that belong to each condition; what a node with several of
@@ -101,6 +102,14 @@ class NodalFrames:
     """
 
     def __init__(self, numbers: Indices, points: Array, directions: Array, held: Mask) -> None:
+        """Make the frames of m conditions.
+
+        Args:
+            numbers: (m,) their nodes.
+            points: (m, d) of these [m].
+            directions: (m, d) unit vectors.
+            held: (m, d) which components of the nodes are prescribed.
+        """
         self.points = points
         self.directions = directions
         self._refuse_prescribed(held)
@@ -119,19 +128,19 @@ class NodalFrames:
         self.oblique = not np.array_equal(self.turns, self.blocks)
 
     def _turn_corner(self, slots: Indices) -> None:
-        """Give a node with several conditions its frame."""
+        """Give a node its frame, with the directions of all its conditions ``slots`` in it."""
         node = self.place[slots[0]]
         self.column[slots], block = make_corner_frame(self.directions[slots])
         self.blocks[node] = block
-        self.turns[node] = (
-            block if are_orthogonal(self.directions[slots]) else np.linalg.inv(block).T
-        )
+        orthogonal = are_orthogonal(self.directions[slots])
+        self.turns[node] = block if orthogonal else np.linalg.inv(block).T
+        # what is left beside the directions rubs with the first condition
         free = ~np.isin(np.arange(len(block)), self.column[slots])
         self.rubs[slots] = False
         self.rubs[slots[0]] = np.delete(free, self.column[slots[0]])
 
     def own_vectors(self) -> Mask:
-        """Return which vectors (m, d) of its node belong to each condition.
+        """Return a mask (m, d) of the vectors of its node that belong to each condition.
 
         They are its direction, and those that rub.
         """
@@ -143,6 +152,7 @@ class NodalFrames:
         return own
 
     def _refuse_prescribed(self, held: Mask) -> None:
+        """Raise InputError for a contact direction with a component that is prescribed."""
         for slot in np.flatnonzero(np.any(held & (self.directions != 0.0), axis=1)):
             raise InputError(
                 f"contact node {describe_point(self.points[slot])} is also prescribed along its "
@@ -151,6 +161,7 @@ class NodalFrames:
             )
 
     def _refuse_dependent(self, slots: Indices) -> None:
+        """Raise InputError for directions of a node that are parallel, too many or dependent."""
         directions = self.directions[slots]
         k, d = directions.shape
         where = f"contact node {describe_point(self.points[slots[0]])}"
@@ -170,21 +181,18 @@ class NodalFrames:
             )
 
 
-def snapped(directions: Array) -> Array:
-    """Turn directions to an axis where they are along it to round-off.
+def snap_to_axes(directions: Array) -> Array:
+    """Turn directions (m, d) to an axis where they are along it to round-off.
 
-    Axis-aligned walls stay unrotated.
+    So the unknowns of walls along the axes stay as they are.
     """
     snapped = np.where(np.abs(directions) < 1e-13, 0.0, directions)
     return np.asarray(snapped / np.linalg.norm(snapped, axis=1)[:, None])
 
 
-def given(parts: Sequence[NodalConditions]) -> tuple[Indices, Array, Array, Mask]:
-    """Return what makes the frames of conditions.
-
-    This is numbers and points of their nodes, directions, held components.
-    """
-    nodes = joined_nodes([part.nodes for part in parts])
+def gather_frame_data(parts: Sequence[NodalConditions]) -> tuple[Indices, Array, Array, Mask]:
+    """Return what makes the frames of conditions, the arguments of ``NodalFrames``."""
+    nodes = join_nodes([part.nodes for part in parts])
     return (
         nodes.numbers,
         nodes.points,
@@ -194,9 +202,16 @@ def given(parts: Sequence[NodalConditions]) -> tuple[Indices, Array, Array, Mask
 
 
 def surface_of(space: NodalSpace, parts: Sequence[NodalConditions], **data: Any) -> FemSurface:
-    """Make the surface of these conditions, one part after the other.
+    """Make the surface of conditions, one part after the other. Collective.
 
-    ``data``: gap0, weights and whatever else it holds of each condition of this rank. Collective.
+    Args:
+        space: what the unknowns mean.
+        parts: this rank's m conditions.
+        **data: gap0 (m,), weights (m,) and whatever else a ``ContactSurface`` holds of them.
+
+    Raises:
+        InputError: on all ranks, a direction that is partly prescribed, and directions of a node
+            that depend on one another.
     """
     comm = space.comm
     d = space.dimension
@@ -206,17 +221,21 @@ def surface_of(space: NodalSpace, parts: Sequence[NodalConditions], **data: Any)
     slots = np.concatenate(
         [start + part.slots for start, part in zip(starts[:-1], parts, strict=True)]
     )
-    frames: NodalFrames = asked(
-        comm, slots, lambda *arrays: (NodalFrames(*arrays),), *given(parts)
-    )[0]
+    # frames are made on each rank of its own nodes, and what one refuses all ranks refuse
+    answer = ask_alike(
+        comm, slots, lambda *arrays: (NodalFrames(*arrays),), *gather_frame_data(parts)
+    )
+    frames: NodalFrames = answer[0]
     # T and T⁻ᵀ, and which unknowns û of a node its conditions and tangents are
     index = space.free_index.reshape(-1, d)[space.blocks_of(frames.numbers)]
     place = frames.place
     column = frames.column
     count = len(slots)
     tangents = np.take_along_axis(index[place], list_tangential_columns(column, d), axis=1)
-    turn = _turn(space, frames.turns, index)
-    dual = _turn(space, frames.blocks, index) if largest(comm, frames.oblique) else None
+    turn = _make_turn(space, frames.turns, index)
+    dual = None
+    if largest(comm, frames.oblique):
+        dual = _make_turn(space, frames.blocks, index)
     if space.hierarchy is not None:
         turn, dual = space.hierarchy.around(turn, turn if dual is None else dual)
     return FemSurface(
@@ -229,14 +248,14 @@ def surface_of(space: NodalSpace, parts: Sequence[NodalConditions], **data: Any)
         basis=turn,
         dual=dual,
         nodes=frames.numbers[place],
-        coupling=_coupling(space, parts, frames, index),
+        coupling=_make_coupling(space, parts, frames, index),
         space=space,
         parts=tuple(parts),
         **{"bilateral": np.zeros(count, dtype=bool), "compliance": np.zeros(count)} | data,
     )
 
 
-def _turn(space: NodalSpace, blocks: Array, index: Indices) -> Matrix | None:
+def _make_turn(space: NodalSpace, blocks: Array, index: Indices) -> Matrix | None:
     """Return the identity but for the blocks of contact nodes (T, or T⁻ᵀ). Collective.
 
     It is None when all blocks are the identity too.
@@ -252,24 +271,25 @@ def _turn(space: NodalSpace, blocks: Array, index: Indices) -> Matrix | None:
     # entries between free components of a node; all other unknowns stay as they are
     free = index >= 0
     used = free[:, :, None] & free[:, None, :]
-    rows, columns = (
-        np.broadcast_to(way, used.shape)[used] for way in (index[:, :, None], index[:, None, :])
-    )
+    rows = np.broadcast_to(index[:, :, None], used.shape)[used]
+    columns = np.broadcast_to(index[:, None, :], used.shape)[used]
     plain = np.setdiff1d(np.arange(n), index)
-    entries = np.concatenate([rows, plain]), np.concatenate([columns, plain])
+    rows = np.concatenate([rows, plain])
+    columns = np.concatenate([columns, plain])
     values = np.concatenate([blocks[used], np.ones(len(plain))])
-    return space.algebra.local(*entries, values, n)
+    return space.algebra.local(rows, columns, values, n)
 
 
-def _coupling(
+def _make_coupling(
     space: NodalSpace, parts: Sequence[NodalConditions], frames: NodalFrames, index: Indices
 ) -> Matrix | None:
-    """Return R with û = R ǔ.
+    """Return R of û = R ǔ, or None where no condition faces others. Collective.
 
-    To the unknowns of a node that faces others, q_c·u = ǔ_c + q_c·(sum_j P_sj u_j + sum_k P_sk
-    e_k).
+        û_c = q_c·u_s = ǔ_c + q_c·(sum_j P_sj u_j + sum_k P_sk e_k)
 
-    At nodes with several conditions each one's own vectors only are relative to what it faces.
+    for the vectors q_c of the frame of a node s that faces nodes j and bubbles k; all other
+    unknowns stay as they are. At nodes with several conditions each one's own vectors only are
+    relative to what it faces.
 
     Args:
         space: what the unknowns mean.
@@ -293,34 +313,31 @@ def _coupling(
         start = slots.stop
         place = frames.place[slots]
         # other bodies have frames of their own where they are in contact; bubbles have none
-        faced = []
+        faced: list[tuple[Facing, Array]] = []
         if part.facing is not None:
-            faced.append((part.facing, _turns(space, frames, part.facing.nodes.numbers)))
-        faced += [
-            (bubble, np.tile(np.eye(space.dimension), (len(bubble.nodes.numbers), 1, 1)))
-            for bubble in part.bubbles
-        ]
+            faced.append((part.facing, _gather_turns(space, frames, part.facing.nodes.numbers)))
+        for bubbles in part.bubbles:
+            axes = np.tile(np.eye(space.dimension), (len(bubbles.nodes.numbers), 1, 1))
+            faced.append((bubbles, axes))
         if not faced:
             continue
-        # rows of R, of the c-th vector of each node's frame
+        # rows of R, of the c-th vector of each node's frame: a one on the diagonal, and what the
+        # node faces
         for c in range(space.dimension):
             rows = np.flatnonzero(relative[slots, c] & (index[place, c] >= 0))
             own.append(index[place[rows], c])
-            diagonal = sp.csr_matrix(
+            coefficients = sp.csr_matrix(
                 (np.ones(len(rows)), (np.arange(len(rows)), first + own[-1])), (len(rows), total)
             )
             directions = frames.blocks[place[rows], :, c]
-            entries.append(
-                sum(
-                    (_faced(other, rows, turns, directions, total) for other, turns in faced),
-                    start=diagonal,
-                )
-            )
+            for other, turns in faced:
+                coefficients = coefficients + _express_faced(other, rows, turns, directions, total)
+            entries.append(coefficients)
     return algebra.replace_identity_rows(n, np.concatenate(own), sp.csr_matrix(sp.vstack(entries)))
 
 
-def _turns(space: NodalSpace, frames: NodalFrames, numbers: Indices) -> Array:
-    """Return T (k, d, d) of nodes that are faced; the axes where nothing else touches them.
+def _gather_turns(space: NodalSpace, frames: NodalFrames, numbers: Indices) -> Array:
+    """Return T (k, d, d) of nodes that are faced, the identity where these have no condition.
 
     Collective.
 
@@ -334,19 +351,20 @@ def _turns(space: NodalSpace, frames: NodalFrames, numbers: Indices) -> Array:
     own = space.blocks_of(frames.numbers)
     known[own, 0] = 1.0
     known[own, 1:] = frames.turns.reshape(-1, d * d)
+    # the first column tells whether a rank knows a frame of the node
     there = space.at_nodes(space.leaders(numbers), known)
     turns = there[:, 1:].reshape(-1, d, d)
     return np.asarray(np.where(there[:, :1, None] > 0.0, turns, np.eye(d)))
 
 
-def _faced(
+def _express_faced(
     facing: Facing, rows: Indices, turns: Array, directions: Array, total: int
 ) -> sp.csr_matrix:
     """Return coefficients (rows, total) of direction·sum_j P_sj u_j in the unknowns û.
 
     Args:
-        facing: what nodes face.
-        rows: which of these nodes.
+        facing: what m nodes face.
+        rows: (rows,) which of these nodes.
         turns: (n, d, d) T of the nodes that are faced.
         directions: (rows, d) unit vectors.
         total: how many unknowns there are on all ranks.
@@ -364,7 +382,11 @@ def _faced(
 def _refuse_chains(space: NodalSpace, parts: Sequence[NodalConditions]) -> None:
     """Raise InputError for a node on side 1 of a pair, or with bubbles, and on side 2 of another.
 
-    R⁻¹ = 2 - R needs them apart. Collective.
+    R = 1 + N has the inverse 2 - R where N N = 0: what is faced must not face others. Collective.
+
+    Args:
+        space: what the unknowns mean.
+        parts: this rank's conditions.
     """
     coupled = [part.nodes.numbers for part in parts if part.facing is not None or part.bubbles]
     first = np.zeros((len(space.nodes), 1))

@@ -1,11 +1,9 @@
-"""Find nodes at which two bodies hang together by a point, or by a line in space.
+"""Find hinges: nodes at which two bodies hang together by a point, or by a line in space.
 
-A contact is glued there.
-
-Bodies that are drawn between the same corner points share these nodes, although each has sides of
-its own. The tip of a crack is a shared node too, but there the material goes on: its cells hang
-together through their facets, round the tip. So a node is a hinge if its cells do not hang together
-through facets at the node.
+A contact is glued there. Bodies that are drawn between the same corner points share these nodes,
+although each has sides of its own. The tip of a crack is a shared node too, but there the material
+goes on: its cells hang together through their facets, round the tip. So a node is a hinge if its
+cells do not hang together through facets at the node.
 """
 
 from collections.abc import Sequence
@@ -24,12 +22,17 @@ from .nodes import Nodes, gather_rows
 NAMED = 4  # hinges that a message names
 
 
-def hinges(space: FemSpace, numbers: Indices) -> Indices:
-    """Return those of these numbers of nodes, the same on every rank, that are hinges. Collective.
+def find_hinges(space: FemSpace, numbers: Indices) -> Indices:
+    """Return those of these nodes that are hinges, the same on every rank. Collective.
 
-    Things that are connected are pairs of a node and a facet at it: all those of one cell, and so,
-    as a facet is of two cells and may be of two ranks, all those round the node. Mid-points of
-    edges and sides are no hinges.
+    Things that are linked are pairs of a node and a facet at it: those of one cell and node are
+    linked, and so, as a facet is of two cells and may be of two ranks, all those that hang together
+    round the node. A node whose pairs fall into several parts is a hinge. Mid-points of edges and
+    sides are none.
+
+    Args:
+        space: the bodies' unknowns.
+        numbers: of the nodes in question, the same on every rank.
     """
     # facets at cells that have one of the nodes, and numbers of their own for pairs of a node and
     # a facet, the same on every rank
@@ -51,7 +54,7 @@ def hinges(space: FemSpace, numbers: Indices) -> Indices:
     )
     keys = nodes.astype(np.int64) * local.size_global + known[:, None]
 
-    # The things of the wanted nodes, and of which cell each is.
+    # the pairs of the nodes in question, and of which cell each is
     side = side.reshape(sides.shape)
     cell = np.broadcast_to(
         np.arange(len(cells))[:, None, None], (*sides.shape, nodes.shape[1])
@@ -64,35 +67,33 @@ def hinges(space: FemSpace, numbers: Indices) -> Indices:
     key = key[wanted]
     things, member = np.unique(key, return_inverse=True)
 
-    # Link all things of one cell and node.
+    # link the pairs of one cell and node
     order = np.lexsort((node, cell))
     same = (np.diff(cell[order]) == 0) & (np.diff(node[order]) == 0)
-    one = member[order[:-1][same]]
-    other = member[order[1:][same]]
+    start = member[order[:-1][same]]
+    end = member[order[1:][same]]
 
-    # What ranks share: facets that are ghosts of some.
+    # ranks share the pairs of facets that are ghosts of some
     ghosts = np.concatenate(from_each(space.comm, known[facets >= local.size_local]))
     of_ghosts = np.isin(things % local.size_global, ghosts)
-    part = parts_of(space.comm, one, other, things, np.flatnonzero(of_ghosts))
+    part = parts_of(space.comm, start, end, things, np.flatnonzero(of_ghosts))
 
-    # Nodes with several parts.
+    # nodes with several parts
     pairs = np.unique(np.column_stack([things // local.size_global, part]), axis=0)
     pairs = np.unique(np.concatenate(from_each(space.comm, pairs)), axis=0)
-    found, parts = np.unique(pairs[:, 0], return_counts=True)
-    return np.asarray(found[parts > 1])
+    nodes_with_parts, parts = np.unique(pairs[:, 0], return_counts=True)
+    return np.asarray(nodes_with_parts[parts > 1])
 
 
-def hinges_of(space: FemSpace, nodes: Nodes) -> Mask:
-    """Return which of this rank's nodes are hinges, if they are not clamped. Collective."""
+def mark_hinges(space: FemSpace, nodes: Nodes) -> Mask:
+    """Return a mask (k,) of this rank's nodes that are hinges and not clamped. Collective."""
     free = ~nodes.held.all(axis=1)
     numbers = np.unique(np.concatenate(from_each(space.comm, nodes.numbers[free])))
-    return np.asarray(free & np.isin(nodes.numbers, hinges(space, numbers)))
+    return np.asarray(free & np.isin(nodes.numbers, find_hinges(space, numbers)))
 
 
 def refuse_hinges(owner: str, names: Sequence[str], points: Array) -> None:
-    """Raise InputError for hinges at these points (k, d), if there are any.
-
-    The points are ordered; ``names`` are those of the boundaries.
+    """Raise InputError for hinges at these points, if there are any.
 
     Args:
         owner: who asks.
@@ -116,7 +117,7 @@ def refuse_hinges(owner: str, names: Sequence[str], points: Array) -> None:
     )
 
 
-def gathered_points(comm: Comm, nodes: Nodes, chosen: Mask) -> Array:
+def gather_points(comm: Comm, nodes: Nodes, chosen: Mask) -> Array:
     """Return the points of the chosen nodes of all ranks, by their numbers. Collective.
 
     Args:

@@ -1,10 +1,13 @@
-"""Join several contact surfaces of one system.
+"""Join several contact surfaces of one system: pairs of bodies, pairs and obstacles, corners.
 
-So there can be more than one pair of bodies, pairs and obstacles, corners.
+The conditions of all come one after the other, and what a surface holds of them is concatenated.
+What is new is at a node of several surfaces: it has one frame with all its directions (``frames``),
+so that tangents, and slides along them, are no longer those of its surfaces.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -13,7 +16,7 @@ from ...core.algebra import Array
 from ...core.corners import make_tangent_vectors
 from ...core.errors import InputError
 from ...core.surfaces import ContactSurface
-from .frames import FemSurface, NodalFrames, given, surface_of
+from .frames import FemSurface, NodalFrames, gather_frame_data, surface_of
 
 Motion = Callable[[float], Array]
 
@@ -32,48 +35,51 @@ def joined_surfaces(*surfaces: ContactSurface) -> ContactSurface:
             boundary or a pair listed twice) or depend on one another; a node on side 1 of one pair
             and side 2 of another.
     """
-    made = [surface for surface in surfaces if isinstance(surface, FemSurface)]
+    ours = [surface for surface in surfaces if isinstance(surface, FemSurface)]
     if (
-        not made
-        or len(made) < len(surfaces)
-        or any(surface.space is not made[0].space for surface in made)
+        not ours
+        or len(ours) < len(surfaces)
+        or any(surface.space is not ours[0].space for surface in ours)
     ):
         raise InputError(
             "joined_surfaces: give surfaces of fem.contact_surface and contact_pair of one system"
         )
-    names = ("gap0", "weights", "bilateral", "compliance")
-    data: dict[str, Any] = {
-        name: np.concatenate([getattr(surface, name) for surface in made]) for name in names
-    }
-    if any(surface.uncovered is not None for surface in made):
-        data["uncovered"] = np.concatenate(
-            [
-                np.zeros(surface.count, dtype=bool)
-                if surface.uncovered is None
-                else surface.uncovered
-                for surface in made
-            ]
-        )
-    parts = [part for surface in made for part in surface.parts]
+
+    # a row for each condition, in the order of the surfaces
+    data: dict[str, Any] = {}
+    for name in ("gap0", "weights", "bilateral", "compliance"):
+        data[name] = np.concatenate([getattr(surface, name) for surface in ours])
+    if any(surface.uncovered is not None for surface in ours):
+        rows = [
+            np.zeros(surface.count, dtype=bool) if surface.uncovered is None else surface.uncovered
+            for surface in ours
+        ]
+        data["uncovered"] = np.concatenate(rows)
     joined = surface_of(
-        made[0].space,
-        parts,
-        motion=_joined([(surface.motion, (surface.count,)) for surface in made]),
-        companions=tuple(one for surface in made for one in surface.companions),
-        watched=tuple(one for surface in made for one in surface.watched),
-        censuses=tuple(one for surface in made for one in surface.censuses),
+        ours[0].space,
+        list(chain(*(surface.parts for surface in ours))),
+        motion=_join_motions([(surface.motion, (surface.count,)) for surface in ours]),
+        companions=tuple(chain(*(surface.companions for surface in ours))),
+        watched=tuple(chain(*(surface.watched for surface in ours))),
+        censuses=tuple(chain(*(surface.censuses for surface in ours))),
         **data,
     )
-    joined = replace(joined, slide=_slide(made))
-    return (
-        joined.with_frictionless_corners()
-        if all(one.frictionless_corners for one in made)
-        else joined
-    )
+    joined = replace(joined, slide=_join_slides(ours))
+    if all(surface.frictionless_corners for surface in ours):
+        return joined.with_frictionless_corners()
+    return joined
 
 
-def _joined(motions: Sequence[tuple[Motion | None, tuple[int, ...]]]) -> Motion | None:
-    """Return the motions of all conditions from those of the surfaces."""
+def _join_motions(motions: Sequence[tuple[Motion | None, tuple[int, ...]]]) -> Motion | None:
+    """Return the motion of all conditions, t [s] -> rows, from those of the surfaces.
+
+    Args:
+        motions: of each surface its motion, and the shape (m, …) of its values, which are zero
+            where it has none.
+
+    Returns:
+        a function of the time, or None where no surface moves.
+    """
     if all(motion is None for motion, _ in motions):
         return None
     return lambda t: np.concatenate(
@@ -81,25 +87,31 @@ def _joined(motions: Sequence[tuple[Motion | None, tuple[int, ...]]]) -> Motion 
     )
 
 
-def _slide(made: Sequence[FemSurface]) -> Motion | None:
-    """Return the slides of all conditions.
+def _join_slides(surfaces: Sequence[FemSurface]) -> Motion | None:
+    """Return how far obstacles slide along the tangents (m, d - 1) of all conditions, t [s] -> [m].
 
-    Those of nodes with several are along the vectors that are left to them.
+    The slide is s = t·x for each tangent t of a condition and the motion x of its obstacle. A node
+    with several conditions has other tangents t' than on each of its surfaces. They lie in the
+    plane of the t, so that t'·x is t' times the sum of s t.
+
+    Args:
+        surfaces: those that are joined.
     """
-    joined = _joined(
-        [(surface.slide, (surface.count, surface.tangents.shape[1])) for surface in made]
+    joined = _join_motions(
+        [(surface.slide, (surface.count, surface.tangents.shape[1])) for surface in surfaces]
     )
-    frames = NodalFrames(*given([part for surface in made for part in surface.parts]))
+    parts = list(chain(*(surface.parts for surface in surfaces)))
+    frames = NodalFrames(*gather_frame_data(parts))
     corners = np.flatnonzero(frames.double[frames.place])
     if joined is None or not len(corners):
         return joined
+
+    # tangents (corners, d, d - 1) as columns, those that do not rub as zeros
     before = np.concatenate(
-        [make_tangent_vectors(surface.normals, surface.nodes) for surface in made]
+        [make_tangent_vectors(surface.normals, surface.nodes) for surface in surfaces]
     )[corners]
-    after = (
-        make_tangent_vectors(frames.directions, frames.place)[corners]
-        * frames.rubs[corners, None, :]
-    )
+    after = make_tangent_vectors(frames.directions, frames.place)[corners]
+    after = after * frames.rubs[corners, None, :]
     turn = np.einsum("kic,kie->kce", after, before)
 
     def slide(t: float) -> Array:

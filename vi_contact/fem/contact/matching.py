@@ -1,8 +1,9 @@
-"""Find the nodes of side 2 that a contact node of side 1 faces.
+"""Find the nodes of side 2 that a contact node of side 1 faces, node by node.
 
-The displacement u_2 at the point opposite node s is sum_j P_sj u_j.
-
-The rows of P sum to one, so that a common translation of both bodies opens and closes nothing.
+The displacement u_2 at the point opposite node s is sum_j P_sj u_j. The rows of P sum to one, so
+that a common translation of both bodies opens and closes nothing. What every matching takes and
+returns (``Side``, ``Matched``, ``Matching``) stands here, beside ``NodeToNode``; ``mortar`` has the
+other one.
 """
 
 from dataclasses import dataclass, field
@@ -17,7 +18,7 @@ from ...core.checks import describe_point
 from ...core.errors import InputError
 from ...core.quantities import Positive
 from .nodes import Nodes
-from .partners import Surface, one_of
+from .partners import Surface, choose_partner
 
 NEARBY = 8  # nodes of side 2 that are looked at first
 # cosine of the angle between a normal and what it is seen from: under less no side faces another
@@ -46,14 +47,14 @@ class Side:
     tied: Indices | None = None
 
 
-def common_nodes(one: Side, two: Side) -> Indices:
-    """Return the places (m,) on side 2 of the nodes of side 1 that are nodes of both.
+def common_nodes(side1: Side, side2: Side) -> Indices:
+    """Return the places (m,) on side 2 of the nodes of side 1 that are nodes of both, -1 of others.
 
-    They are so at a tip or a weld, or tied to one of side 2, which is the same; -1 stands for
-    others.
+    A node is one of both at a tip or a weld, or where it is tied to one of side 2, which is the
+    same.
     """
-    places = np.full(len(one.nodes.numbers), -1) if one.tied is None else one.tied.copy()
-    _, own, others = np.intersect1d(one.nodes.numbers, two.nodes.numbers, return_indices=True)
+    places = np.full(len(side1.nodes.numbers), -1) if side1.tied is None else side1.tied.copy()
+    _, own, others = np.intersect1d(side1.nodes.numbers, side2.nodes.numbers, return_indices=True)
     places[own] = others
     return places
 
@@ -100,27 +101,31 @@ class Matched:
 class Matching(Protocol):
     """Find what the nodes of side 1 face. InputError when they do not."""
 
-    def match(self, one: Side, two: Side, size: float) -> Matched:
-        """Return what the nodes of side ``one`` face on side ``two``.
+    def match(self, side1: Side, side2: Side, size: float) -> Matched:
+        """Return what the nodes of side 1 face on side 2.
 
         Args:
-            one: side 1.
-            two: side 2.
+            side1: side 1.
+            side2: side 2.
             size: that of the mesh [m].
         """
 
 
 @dataclass(frozen=True)
 class NodeToNode:
-    """Match conforming sides.
+    """Match conforming sides: each node of side 1 has one of side 2 opposite, along its normal.
 
-    Every node of side 1 has one node of side 2 at its place, or opposite along its normal.
+    Of several nodes at one place, of bodies that meet there, the partner is the one whose facets
+    lie in front of all facets of the node.
 
-    ``tolerance``: how far beside the normal the partner may lie, as a share of the distance to the
-    next node of side 1. Of several nodes at one place, of bodies that meet there, the partner is
-    the one whose facets lie in front of all facets of the node. InputError where there is none, as
-    for a stone on two stones, for nodes without a partner, two nodes with the same one, and sides
-    that do not face each other.
+    Args:
+        tolerance: how far beside the normal the partner may lie, as a share of the distance to the
+            next node of side 1.
+
+    Raises:
+        InputError: from ``match``, nodes without a partner, several nodes that are none by
+            themselves, as two stones under a third one, two nodes with the same partner, and sides
+            that do not face each other.
     """
 
     tolerance: Annotated[float, Positive] = BESIDE
@@ -128,84 +133,90 @@ class NodeToNode:
     def __post_init__(self) -> None:
         check_fields(self)
 
-    def match(self, one: Side, two: Side, size: float) -> Matched:
+    def match(self, side1: Side, side2: Side, size: float) -> Matched:
         """Return what every node of side 1 faces; InputError where a node has no partner.
 
         Args:
-            one: side 1.
-            two: side 2.
+            side1: side 1.
+            side2: side 2.
             size: that of the mesh [m].
         """
-        partner = self._partners(one, two, size)
+        partner = self._find_partners(side1, side2, size)
         missing = np.flatnonzero(partner < 0)
         if len(missing):
             raise InputError(
-                f"{len(missing)} of {len(partner)} nodes of '{one.name}' have no node of "
-                f"'{two.name}' opposite, the first at "
-                f"{describe_point(one.nodes.points[missing[0]])}: mesh both sides alike, make the "
-                "smaller side the first, or use matching=DualMortar()"
+                f"{len(missing)} of {len(partner)} nodes of '{side1.name}' have no node of "
+                f"'{side2.name}' opposite, the first at "
+                f"{describe_point(side1.nodes.points[missing[0]])}: "
+                "mesh both sides alike, make the smaller side the first, or use "
+                "matching=DualMortar()"
             )
-        first, counts = np.unique(partner, return_counts=True)
+        partners, counts = np.unique(partner, return_counts=True)
         if counts.max() > 1:
             raise InputError(
-                f"several nodes of '{one.name}' face the node of '{two.name}' at "
-                f"{describe_point(two.nodes.points[first[counts.argmax()]])}: mesh both sides "
-                "alike, or use matching=DualMortar()"
+                f"several nodes of '{side1.name}' face the node of '{side2.name}' at "
+                f"{describe_point(side2.nodes.points[partners[counts.argmax()]])}: mesh both "
+                "sides alike, or "
+                "use matching=DualMortar()"
             )
         m = len(partner)
-        P = sp.csr_matrix((np.ones(m), (np.arange(m), partner)), shape=(m, len(two.nodes.points)))
-        return Matched(np.arange(m), P, one.nodes.weights, np.zeros(m))
+        P = sp.csr_matrix((np.ones(m), (np.arange(m), partner)), shape=(m, len(side2.nodes.points)))
+        return Matched(np.arange(m), P, side1.nodes.weights, np.zeros(m))
 
-    def _partners(self, one: Side, two: Side, size: float) -> Indices:
+    def _find_partners(self, side1: Side, side2: Side, size: float) -> Indices:
         """Return the place of the nearest node opposite among those of side 2, -1 for none.
 
         Args:
-            one: side 1.
-            two: side 2.
+            side1: side 1.
+            side2: side 2.
             size: that of the mesh [m].
         """
-        x = one.nodes.points
-        count = len(two.nodes.points)
-        spacing = _spacing(one.nodes.points, size)
+        x = side1.nodes.points
+        count = len(side2.nodes.points)
+        spacing = _measure_spacing(side1.nodes.points, size)
         reach = self.tolerance * spacing
         together = 2.0 * min(self.tolerance, BESIDE) * spacing
         from scipy.spatial import cKDTree  # late: it takes a while
 
         # the nearest nodes first
-        away, nearby = cKDTree(two.nodes.points).query(x, k=np.arange(1, min(NEARBY, count) + 1))
-        partner, along, turned, crowds = _opposite(
-            one.nodes, two.nodes, np.sort(nearby, axis=1), reach
+        tree = cKDTree(side2.nodes.points)
+        distances, nearby = tree.query(x, k=np.arange(1, min(NEARBY, count) + 1))
+        partner, along, turned, crowds = _find_opposite(
+            side1.nodes, side2.nodes, np.sort(nearby, axis=1), reach
         )
         # what is as near along the normal, or nearer, lies in a ball of this size: unless all of it
         # was looked at, all nodes are
-        unsure = np.flatnonzero((1.0 + 1e-9) * np.hypot(along + reach, reach) >= away[:, -1])
+        ball = (1.0 + 1e-9) * np.hypot(along + reach, reach)
+        unsure = np.flatnonzero(ball >= distances[:, -1])
         whole = np.arange(count)[None, :]
-        groups = -(-len(unsure) * count // DISTANCES)
-        for rows in np.array_split(unsure, groups) if len(unsure) else ():
-            partner[rows], _, turned[rows], more = _opposite(
-                one.nodes.pick(rows), two.nodes, whole, reach[rows]
+        groups = max(-(-len(unsure) * count // DISTANCES), 1)
+        for rows in np.array_split(unsure, groups):
+            if not len(rows):
+                continue
+            partner[rows], _, turned[rows], more = _find_opposite(
+                side1.nodes.pick(rows), side2.nodes, whole, reach[rows]
             )
-            crowds |= {int(rows[row]): crowd for row, crowd in more.items()}
+            crowds |= {int(rows[row]): places for row, places in more.items()}
         # where several nodes lie at one place, facets tell which is the partner
-        surface1 = Surface(x, one.facets)
-        surface2 = Surface(two.nodes.points, two.facets)
-        for row, (these, apart) in sorted(crowds.items()):
-            offset = two.nodes.points[these] - two.nodes.points[these[0]]
+        surface1 = Surface(x, side1.facets)
+        surface2 = Surface(side2.nodes.points, side2.facets)
+        for row, (crowd, apart) in sorted(crowds.items()):
+            offset = side2.nodes.points[crowd] - side2.nodes.points[crowd[0]]
             alike = np.linalg.norm(offset, axis=1) <= together[row]
-            chosen = one_of(
+            chosen = choose_partner(
                 surface1,
                 row,
-                one.nodes.normals[row],
+                side1.nodes.normals[row],
                 surface2,
-                these[alike],
+                crowd[alike],
                 apart[alike],
                 ONE_PLACE * reach[row],
             )
             if chosen < 0:
-                _refuse_several(one, two, row)
+                _refuse_several(side1, side2, row)
             partner[row] = chosen
         if turned.any():
-            refuse_same_way(one.name, two.name, x[np.argmax(turned)])
+            refuse_same_way(side1.name, side2.name, x[np.argmax(turned)])
         return partner
 
 
@@ -214,27 +225,28 @@ class NodeToNode:
 Crowds = dict[int, tuple[Indices, Array]]
 
 
-def _opposite(
-    one: Nodes, two: Nodes, places: Indices, reach: Array
+def _find_opposite(
+    nodes1: Nodes, nodes2: Nodes, places: Indices, reach: Array
 ) -> tuple[Indices, Array, Mask, Crowds]:
-    """Find what each node of side 1 faces among these ``places`` (m, k) on side 2.
-
-    Returns (the first of the nearest nodes opposite each one, -1 for none; how far along the
-    normal, infinite for none; whether all that are there face away; where several are about as
-    near).
+    """Find what each node of side 1 faces among some places on side 2.
 
     Args:
-        one: m nodes of side 1.
-        two: nodes of side 2.
-        places: (m, k) which of these are looked at.
+        nodes1: m nodes of side 1.
+        nodes2: nodes of side 2.
+        places: (m, k) which of these are looked at; (1, k) for the same ones at all nodes.
         reach: (m,) how far beside the normal a partner may lie [m].
+
+    Returns:
+        (m,) the nearest node opposite each one, -1 for none; (m,) how far it is along the normal
+        [m], infinite for none; (m,) whether nodes are there and all face away; and by row those
+        nodes that have several about as near in front of them.
     """
     # how far along its normal, and how far beside it, each node of side 2 is
-    offset = two.points[places] - one.points[:, None, :]
-    along = np.einsum("ijk,ik->ij", offset, one.normals)
-    beside = np.linalg.norm(offset - along[:, :, None] * one.normals[:, None, :], axis=2)
+    offset = nodes2.points[places] - nodes1.points[:, None, :]
+    along = np.einsum("ijk,ik->ij", offset, nodes1.normals)
+    beside = np.linalg.norm(offset - along[:, :, None] * nodes1.normals[:, None, :], axis=2)
     near = beside <= reach[:, None]
-    slope = np.einsum("ijk,ik->ij", two.normals[places], one.normals)
+    slope = np.einsum("ijk,ik->ij", nodes2.normals[places], nodes1.normals)
     distance = np.where(near & (slope < -EDGE_ON), np.abs(along), np.inf)
     least = distance.min(axis=1)
     # where several bodies meet they have a node each at one place, told apart by their normals
@@ -250,61 +262,63 @@ def _opposite(
     for row in np.flatnonzero(
         any_there & (np.sum(distance <= (least + reach)[:, None], axis=1) > 1)
     ):
-        these = np.flatnonzero(distance[row] <= least[row] + reach[row])
-        these = np.concatenate([[nearest[row]], these[these != nearest[row]]])
-        crowds[int(row)] = places[row, these], distance[row, these]
+        close = np.flatnonzero(distance[row] <= least[row] + reach[row])
+        close = np.concatenate([[nearest[row]], close[close != nearest[row]]])
+        crowds[int(row)] = places[row, close], distance[row, close]
     return partner, distance[rows, nearest], near.any(axis=1) & ~any_there, crowds
 
 
-def _refuse_several(one: Side, two: Side, row: int) -> None:
+def _refuse_several(side1: Side, side2: Side, row: int) -> None:
     """Raise InputError for a node of side 1 that faces several nodes of side 2.
 
     Each of them has a part of what it faces.
 
     Args:
-        one: side 1.
-        two: side 2.
+        side1: side 1.
+        side2: side 2.
         row: the place of the node on side 1.
     """
     where = (
-        f"the node of '{one.name}' at {describe_point(one.nodes.points[row])} faces several nodes "
-        f"of '{two.name}' at one place"
+        f"the node of '{side1.name}' at {describe_point(side1.nodes.points[row])} faces several "
+        f"nodes of "
+        f"'{side2.name}' at one place"
     )
-    d = one.nodes.points.shape[1]
+    d = side1.nodes.points.shape[1]
     if d == 1:
         raise InputError(f"{where}, and can touch one only: list the end of one bar on side 2")
     mortar = 'matching=DualMortar(), in a case file matching = {type = "DualMortar"}'
-    if max(one.facets.shape[1], two.facets.shape[1]) > (2 if d == 2 else 4):
+    if max(side1.facets.shape[1], side2.facets.shape[1]) > (2 if d == 2 else 4):
         mortar = f"degree=1 and {mortar}"
     raise InputError(
         f"{where}, as a stone does on two stones, and no single one is its partner: use {mortar}"
     )
 
 
-def refuse_same_way(one: str, two: str, point: Array) -> None:
+def refuse_same_way(name1: str, name2: str, point: Array) -> None:
     """Raise InputError for sides whose outward normals point the same way.
 
     Args:
-        one: name of side 1.
-        two: name of side 2.
+        name1: name of side 1.
+        name2: name of side 2.
         point: (d,) where [m].
     """
     raise InputError(
-        f"'{two}' does not face '{one}' at {describe_point(point)}, where both outward normals "
-        "point the same way: choose the two boundaries between the bodies"
+        f"'{name2}' does not face '{name1}' at {describe_point(point)}, where both outward "
+        f"normals point the "
+        "same way: choose the two boundaries between the bodies"
     )
 
 
-def _spacing(points: Array, size: float) -> Array:
-    """Return the distance [m] of each node to the next one of the same side.
+def _measure_spacing(points: Array, size: float) -> Array:
+    """Return the distances (m,) [m] of nodes to the next node of their side that is elsewhere.
 
-    That one is not at its place; for a single node it is the size of the mesh.
+    For a single node it is the size of the mesh.
     """
     if len(points) == 1:
         return np.array([size])
     from scipy.spatial import cKDTree
 
-    apart = cKDTree(points).query(points, k=min(NEARBY, len(points)))[0]
+    apart, _ = cKDTree(points).query(points, k=min(NEARBY, len(points)))
     elsewhere = apart > 1e-9 * size
     next_one = np.take_along_axis(apart, elsewhere.argmax(axis=1)[:, None], axis=1)[:, 0]
     return np.asarray(np.where(elsewhere.any(axis=1), next_one, size))

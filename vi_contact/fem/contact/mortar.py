@@ -32,10 +32,10 @@ import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, Mask
 from ...core.errors import InputError
-from .covering import Carried, Coupled, Covered, coupled, extrapolation
+from .covering import Carried, Coupled, Covered, couple, extrapolation
 from .curves import FARTHER, curvatures, may_overlap
 from .matching import EDGE_ON, Matched, Side, common_nodes, refuse_same_way
-from .mortar_in_space import ROUND_OFF, handed_over, in_space
+from .mortar_in_space import ROUND_OFF, hand_over, in_space
 
 POINTS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)  # of Gauss, on [0, 1], weights ½
 AT_NODE = 1e-9  # of a segment: round-off of where its covered part ends
@@ -43,45 +43,45 @@ AT_NODE = 1e-9  # of a segment: round-off of where its covered part ends
 
 @dataclass(frozen=True)
 class DualMortar:
-    """Match sides of plane and solid bodies with any meshes by the dual mortar method.
-
-    It has dual Lagrange multipliers.
+    """Match sides of plane and solid bodies with any meshes by dual Lagrange multipliers.
 
     A node of side 1 beyond the edge of side 2 keeps its condition, in the mean over what is
     covered, where that is at least half of its share of the facets around it; else the nodes inside
     carry it, and it has none (``covering``). Initial gaps are means too; where facets of the same
     curved face overlap by no more than their distance from it, some h²/(8R) on a curve of radius R,
-    the gap is zero (``fem.contact.curves``). Plane sides may overlap by round-off only. InputError
-    for bars, for sides that do not face each other, in space for facets that are slivers or not
-    convex.
+    the gap is zero (``fem.contact.curves``). Plane sides may overlap by round-off only.
+
+    Raises:
+        InputError: from ``match``, for bars, for facets of second order, for sides that do not face
+            each other, in space for facets that are slivers or not convex.
     """
 
     partial: ClassVar[bool] = True  # parts of side 1 in front of nothing have no conditions
 
-    def match(self, one: Side, two: Side, size: float) -> Matched:
+    def match(self, side1: Side, side2: Side, size: float) -> Matched:
         """Return what the nodes of side 1 face by the dual mortar coupling.
 
         Args:
-            one: side 1.
-            two: side 2.
+            side1: side 1.
+            side2: side 2.
             size: that of the mesh [m]; nothing here needs it.
         """
-        d = one.nodes.points.shape[1]
+        d = side1.nodes.points.shape[1]
         if d == 1:
             raise InputError(
                 "DualMortar joins sides of plane and solid bodies: use matching=NodeToNode() for "
                 "bars"
             )
-        if max(one.facets.shape[1], two.facets.shape[1]) > (2 if d == 2 else 4):
+        if max(side1.facets.shape[1], side2.facets.shape[1]) > (2 if d == 2 else 4):
             raise InputError(
-                f"DualMortar joins facets of first order and those of '{one.name}' and "
-                f"'{two.name}' have mid-points (degree=2): mesh both sides alike for "
+                f"DualMortar joins facets of first order and those of '{side1.name}' and "
+                f"'{side2.name}' have mid-points (degree=2): mesh both sides alike for "
                 "matching=NodeToNode(), or use degree=1"
             )
-        coupling = in_space(one, two) if d == 3 else _in_plane(one, two)
+        coupling = in_space(side1, side2) if d == 3 else _in_plane(side1, side2)
         D = coupling.D
         if not (D > 0.0).any():
-            _refuse(one, two)
+            _refuse_apart(side1, side2)
         # P = D⁻¹ M, at the nodes that have a function
         rows = np.flatnonzero(D > 0.0)
         P = sp.csr_matrix(sp.diags([1.0 / D[rows]], [0]) @ coupling.M[rows])
@@ -89,15 +89,15 @@ class DualMortar:
         return Matched(rows, P, D[rows], coupling.overlap[rows], coupling.share[rows], carried)
 
 
-def _refuse(one: Side, two: Side) -> None:
+def _refuse_apart(side1: Side, side2: Side) -> None:
     """Raise InputError for sides of which no part lies opposite the other."""
     some, others = (
-        side.nodes.normals[:: 1 + len(side.nodes.normals) // 1000] for side in (one, two)
+        side.nodes.normals[:: 1 + len(side.nodes.normals) // 1000] for side in (side1, side2)
     )
     if np.all(some @ others.T > EDGE_ON):
-        refuse_same_way(one.name, two.name, one.nodes.points[0])
+        refuse_same_way(side1.name, side2.name, side1.nodes.points[0])
     raise InputError(
-        f"no part of '{two.name}' lies opposite '{one.name}', along the normals of the latter: "
+        f"no part of '{side2.name}' lies opposite '{side1.name}', along the normals of the latter: "
         "choose the two boundaries between the bodies"
     )
 
@@ -106,10 +106,14 @@ def _refuse(one: Side, two: Side) -> None:
 class _Segment:
     """Hold a segment of side 1 in front of side 2.
 
+    The coordinate along a segment is 0 at its first node and 1 at its second one.
+
     Attributes:
         nodes: (2,) its nodes.
         ends: (2, 2) their points [m].
-        pieces: (low, high, segment of side 2, its coordinates at low and high) of each piece.
+        pieces: its pieces in front of one segment of side 2 each: coordinates low and high where
+            the piece begins and ends, number of the segment of side 2, and (2,) coordinates there
+            of what lies opposite low and high.
         own: (2, 2) ∫ phi phiᵀ over the pieces [m].
         mixed: by segment of side 2, (2, 2) ∫ phi_i phi_j [m].
         overlap: by how much polygons of one curve may overlap on it [m].
@@ -133,26 +137,27 @@ class _Segment:
         return np.asarray((points - self.ends[0]) @ along / (along @ along))
 
 
-def _in_plane(one: Side, two: Side) -> Coupled:
-    """Integrate the coupling of sides of plane bodies."""
-    ends1 = one.nodes.points[one.facets]
-    ends2 = two.nodes.points[two.facets]
-    normals1 = _normals(one, ends1)
-    normals2 = _normals(two, ends2)
-    H = curvatures(ends2, two.facets, normals2)
+def _in_plane(side1: Side, side2: Side) -> Coupled:
+    """Couple sides of plane bodies: find pieces, see what they cover, then assemble D and M."""
+    ends1 = side1.nodes.points[side1.facets]
+    ends2 = side2.nodes.points[side2.facets]
+    normals1 = _normals(side1, ends1)
+    normals2 = _normals(side2, ends2)
+    H = curvatures(ends2, side2.facets, normals2)
+
     segments = []
     # project side 2 onto each segment of side 1, and integrate over the pieces that this makes
-    for facet, ends, normal in zip(one.facets, ends1, normals1, strict=True):
+    for facet, ends, normal in zip(side1.facets, ends1, normals1, strict=True):
         pieces = list(_pieces(ends, normal, ends2, normals2))
         if sum(high - low for low, high, *_ in pieces) > ROUND_OFF:
             length = float(np.linalg.norm(ends[1] - ends[0]))
-            overlap = _overlap(pieces, ends, ends2, H)
-            segments.append(_Segment(facet, ends, pieces, *_integrals(pieces, length), overlap))
-    covered = _covered(segments, common_nodes(one, two) >= 0)
-    return coupled(covered, lambda carried: _assembled(one, two, segments, carried))
+            overlap = _find_overlap(pieces, ends, ends2, H)
+            segments.append(_Segment(facet, ends, pieces, *_integrate(pieces, length), overlap))
+    covered = _measure_cover(segments, common_nodes(side1, side2) >= 0)
+    return couple(covered, lambda carried: _assemble(side1, side2, segments, carried))
 
 
-def _overlap(
+def _find_overlap(
     pieces: list[tuple[float, float, int, Array]], ends: Array, ends2: Array, H: Array
 ) -> float:
     """Return by how much the polygon of side 2 may overlap a segment of side 1 [m].
@@ -168,13 +173,16 @@ def _overlap(
     share = np.array([0.0, 0.5, 1.0])
     own = np.array([low + share * (high - low) for low, high, *_ in pieces])
     other = np.array([across[0] + share * (across[1] - across[0]) for *_, across in pieces])
-    one = np.stack([1.0 - own, own], axis=2), np.repeat(ends[None], len(pieces), axis=0)
-    two = np.stack([1.0 - other, other], axis=2), ends2[segment]
-    return float(may_overlap(H[segment], one, two).max())
+    facet1 = np.stack([1.0 - own, own], axis=2), np.repeat(ends[None], len(pieces), axis=0)
+    facet2 = np.stack([1.0 - other, other], axis=2), ends2[segment]
+    return float(may_overlap(H[segment], facet1, facet2).max())
 
 
-def _covered(segments: list[_Segment], common: Mask) -> Covered:
-    """Return what is covered of these segments; ``common``: nodes (m,) of both sides."""
+def _measure_cover(segments: list[_Segment], common: Mask) -> Covered:
+    """Measure what is covered of segments; ``common``: (m,) nodes of side 1 that side 2 has too.
+
+    Segments without anything in front of them are not among these. There may be none at all.
+    """
     spans = [_span(segment) for segment in segments]
     ends = np.array(spans).reshape(-1, 2)
     corners = np.array([segment.ends for segment in segments]).reshape(-1, 2, 2)
@@ -201,42 +209,44 @@ def _share(segment: _Segment) -> float:
     return sum(piece[1] - piece[0] for piece in segment.pieces)
 
 
-def _assembled(
-    one: Side, two: Side, segments: list[_Segment], carried: Carried
+def _assemble(
+    side1: Side, side2: Side, segments: list[_Segment], carried: Carried
 ) -> tuple[Array, sp.csr_matrix, Array]:
     """Return D (m,), M (m, n) and by how much polygons of one curve may overlap (m,) [m].
 
     Args:
-        one: side 1, of m nodes.
-        two: side 2, of n nodes.
+        side1: side 1, of m nodes.
+        side2: side 2, of n nodes.
         segments: those of side 1 in front of side 2.
         carried: nodes that others carry.
     """
-    m = len(one.nodes.points)
-    n = len(two.nodes.points)
+    m = len(side1.nodes.points)
+    n = len(side2.nodes.points)
     D = np.zeros(m)
     M = sp.lil_matrix((m, n))
     overlap = np.zeros(m)
-    partner = common_nodes(one, two)
+    partner = common_nodes(side1, side2)
     for part, by, used in zip(segments, carried.by, carried.used, strict=True):
         if not used:
             continue
         facet = part.nodes
         own = part.own
         overlap[facet] = np.maximum(overlap[facet], part.overlap)
+        # a node that is carried has its share on the nodes of another segment
         if carried.nodes[facet].any():
             overlap[by] = np.maximum(overlap[by], FARTHER * part.overlap)
-            _carry(D, M, one.nodes.points, two.facets, part, by, carried.nodes)
+            _carry(D, M, side1.nodes.points, side2.facets, part, by, carried.nodes)
             continue
-        # psi = A phi; nodes of both sides hand their functions over
+        # psi = A phi with A = diag(∫ phi) (∫ phi phiᵀ)⁻¹; nodes of both sides hand theirs over
         dual = np.diag(own.sum(axis=1)) @ np.linalg.inv(own)
         common = partner[facet]
         dual, own_D, forces = (
-            array[0] for array in handed_over(dual[None], own.sum(axis=1)[None], common[None] >= 0)
+            array[0] for array in hand_over(dual[None], own.sum(axis=1)[None], common[None] >= 0)
         )
+        # D_s = ∫ psi_s, M_sj = ∫ psi_s phi_j, and what is passed on to nodes t of both sides
         D[facet] += own_D
         for segment, values in part.mixed.items():
-            for j, column in zip(two.facets[segment], (dual @ values).T, strict=True):
+            for j, column in zip(side2.facets[segment], (dual @ values).T, strict=True):
                 for i, value in zip(facet, column, strict=True):
                     M[i, j] += value
         for j in np.flatnonzero(common >= 0):
@@ -253,7 +263,7 @@ def _carry(
     by: Indices,
     carried: Mask,
 ) -> None:
-    """Add to D and M what a segment adds of which some node is carried (``covering``).
+    """Add the share of a segment with a carried node to D and M, as ``covering`` says.
 
     Args:
         D: (m,) ∫ psi of each node of side 1; it is added to.
@@ -267,13 +277,15 @@ def _carry(
     weights = part.own.sum(axis=1)
     inverse = np.linalg.inv(part.own)
     # E: what each node that carries counts at each node of this segment
-    there = part.places(points[by])[None, :, None]
-    shares = extrapolation(there, part.places(part.ends)[None, :, None])[0]
+    carrying = part.places(points[by])[None, :, None]
+    shares = extrapolation(carrying, part.places(part.ends)[None, :, None])[0]
     for i, (node, weight) in enumerate(zip(part.nodes, weights, strict=True)):
-        for k, share in zip(by, shares[i], strict=True) if carried[node] else ((node, 1.0),):
+        # who has the condition of this node: the nodes that carry it, or itself
+        carriers = zip(by, shares[i], strict=True) if carried[node] else [(node, 1.0)]
+        for k, share in carriers:
             place = float(part.places(points[k]))
             D[k] += share * weight
-            # of the functions of the segment, which span (1, x)
+            # psi_k = D_k b(x)ᵀ (∫ b bᵀ)⁻¹ b(x_k), with b = phi of the segment, which spans (1, x)
             psi = share * weight * _hats(place) @ inverse
             for segment, values in part.mixed.items():
                 M[k, facets2[segment]] = M[k, facets2[segment]].toarray().ravel() + psi @ values
@@ -322,12 +334,14 @@ def _pieces(
             yield start, end, segment, (np.array([start, end]) - place[segment, 0]) / slope[nearest]
 
 
-def _integrals(
+def _integrate(
     pieces: list[tuple[float, float, int, Array]], length: float
 ) -> tuple[Array, dict[int, Array]]:
-    """Return ∫ phi phiᵀ (2, 2) over the pieces, and by segment of side 2 ∫ phi_i phi_j (2, 2).
+    """Return ∫ phi phiᵀ (2, 2) [m] over the pieces, and by segment of side 2 ∫ phi_i phi_j (2, 2).
 
-    ``length``: that of the segment of side 1 [m].
+    Args:
+        pieces: those of a segment of side 1.
+        length: that of this segment [m].
     """
     own = np.zeros((2, 2))
     mixed: dict[int, Array] = {}

@@ -1,6 +1,4 @@
-"""Integrate the dual mortar coupling of sides in space.
-
-They are of triangles or quadrilaterals, in any mixture of both sides.
+"""Integrate the dual mortar coupling of sides in space, of triangles and quadrilaterals.
 
 A node of side 1 looks along its own normal, so that what it faces lies on that normal and normal
 forces have no moment. Along it, its facets and those of side 2 are seen as polygons of a plane
@@ -12,6 +10,10 @@ with b = phi if that is all of it (biorthogonal functions, of distorted quadrila
 (1, x, y) if it is a part: bilinear functions, carried on from a strip of a facet to its far nodes,
 grow without bound as the strip thins. Both keep sum_s psi_s = 1, ∫ psi_s = D_s > 0 and ∫ psi_s x =
 D_s x_s, and are the same on triangles.
+
+The steps of ``in_space``: looks and pieces some at a time (``_Block``), the integrals of each
+block, what all of them cover (``covering``), and D and M from the blocks. Letters in shapes: v
+nodes of a facet of side 1, w of side 2, m and n nodes of the sides.
 """
 
 from collections.abc import Iterator, Sequence
@@ -22,7 +24,7 @@ import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, Mask
 from .clipping import areas, hats, rule, triangles, turns
-from .covering import Carried, Coupled, Covered, coupled, extrapolation
+from .covering import Carried, Coupled, Covered, couple, extrapolation
 from .curves import FARTHER, curvatures, may_overlap
 from .matching import Side, common_nodes
 from .sight import WHOLE, Facets, Looks, Pieces, facets_of, looks_of, opposite
@@ -34,7 +36,7 @@ MOST_POINTS = 20  # of Gauss a way
 POINTS = 2**18  # at which functions are held at once, a few for each triangle of a piece
 
 
-def integrals(looks: Looks, pieces: Pieces) -> tuple[Array, Array]:
+def integrate(looks: Looks, pieces: Pieces) -> tuple[Array, Array]:
     """Integrate products of shape functions over what looks share with facets of side 2.
 
     Args:
@@ -63,9 +65,9 @@ def integrals(looks: Looks, pieces: Pieces) -> tuple[Array, Array]:
         other = hats(pieces.seen[piece], points)
         weighted = phi * (weights[:, None] * (areas(corners) / looks.slant[look])[:, None, None])
         weighted = weighted.swapaxes(1, 2)
-        own += summed(piece, weighted @ phi, len(own))
-        mixed += summed(piece, weighted @ other, len(own))
-    return summed(pieces.look, own, k).reshape(k, v, v), mixed.reshape(-1, v, w)
+        own += sum_rows(piece, weighted @ phi, len(own))
+        mixed += sum_rows(piece, weighted @ other, len(own))
+    return sum_rows(pieces.look, own, k).reshape(k, v, v), mixed.reshape(-1, v, w)
 
 
 def _groups_of(orders: Indices) -> Iterator[Indices]:
@@ -95,7 +97,7 @@ def order_of(polygons: Array) -> Indices:
     )
 
 
-def summed(place: Indices, values: Array, count: int) -> Array:
+def sum_rows(place: Indices, values: Array, count: int) -> Array:
     """Return sums of rows of values that have the same place.
 
     Args:
@@ -112,8 +114,8 @@ def summed(place: Indices, values: Array, count: int) -> Array:
     return np.asarray(ones @ values.reshape(len(place), int(np.prod(values.shape[1:]))))
 
 
-def dual(looks: Looks, own: Array, whole: Mask) -> Array:
-    """Return A (looks, v, v) of the functions psi = A phi of looks.
+def make_dual(looks: Looks, own: Array, whole: Mask) -> Array:
+    """Return A (looks, v, v) of the dual functions psi = A phi of looks.
 
     Args:
         looks: those of side 1.
@@ -128,14 +130,17 @@ def dual(looks: Looks, own: Array, whole: Mask) -> Array:
 
 
 def linear_functions(looks: Looks, own: Array) -> tuple[Array, Array, Array]:
-    """Return b at the nodes of looks (looks, v, 3), (∫ b bᵀ)⁻¹ (looks, 3, 3), and the middles.
+    """Return what is to be known of b = (1, x, y) on looks.
 
-    There b = (1, 0, 0): the middles (looks, 1, 2) of what is in front of side 2. Lengths are over
-    the reach of the facet.
+    x and y are measured from the middle of what is in front of side 2, over the reach of the facet,
+    so that the entries of ∫ b bᵀ are of one size.
 
     Args:
         looks: those of side 1.
         own: (looks, v, v) ∫ phi phiᵀ over their parts in front of side 2.
+
+    Returns:
+        b at the nodes (looks, v, 3), (∫ b bᵀ)⁻¹ (looks, 3, 3), and these middles (looks, 1, 2) [m].
     """
     D = own.sum(axis=2)
     middle = np.einsum("kv,kvc->kc", D, looks.polygons) / D.sum(axis=1)[:, None]
@@ -144,8 +149,8 @@ def linear_functions(looks: Looks, own: Array) -> tuple[Array, Array, Array]:
     return linear, np.linalg.inv(linear.swapaxes(1, 2) @ own @ linear), middle[:, None, :]
 
 
-def entries(values: Array, rows: Indices, columns: Indices, m: int, n: int) -> sp.coo_matrix:
-    """Return values summed at their rows and columns.
+def sum_entries(values: Array, rows: Indices, columns: Indices, m: int, n: int) -> sp.coo_matrix:
+    """Return the matrix (m, n) of values, summed where several have one row and column.
 
     Args:
         values: (k, v, w).
@@ -161,7 +166,7 @@ def entries(values: Array, rows: Indices, columns: Indices, m: int, n: int) -> s
     ).tocoo()
 
 
-def handed_over(functions: Array, D: Array, common: Mask) -> tuple[Array, Array, Array]:
+def hand_over(functions: Array, D: Array, common: Mask) -> tuple[Array, Array, Array]:
     """Let nodes of both sides hand their functions to the others of their facets (``mortar``).
 
     Args:
@@ -193,7 +198,8 @@ class _Block:
         looks: those of side 1.
         pieces: what they share with side 2.
         covered: (looks,) share of each that is covered.
-        own, mixed: ``integrals`` of the functions of side 1, and of both sides.
+        own: (looks, v, v) ∫ phi phiᵀ of the functions of side 1 [m²].
+        mixed: (pieces, v, w) ∫ phi_i phi_j of those of both sides [m²].
     """
 
     looks: Looks
@@ -217,21 +223,21 @@ class _Block:
         """
         size = areas(self.pieces.polygons)
         looks = self.looks
-        seen = summed(
+        seen = sum_rows(
             self.pieces.look, size[:, None] * self.pieces.polygons.mean(axis=1), len(looks.nodes)
         )
-        seen /= summed(self.pieces.look, size[:, None], len(looks.nodes))
+        seen /= sum_rows(self.pieces.look, size[:, None], len(looks.nodes))
         return looks.middles + np.einsum("kic,kc->ki", looks.frames, seen)
 
 
-def in_space(one: Side, two: Side) -> Coupled:
-    """Integrate the coupling of sides of solid bodies."""
-    ours = facets_of(one, 1)
-    theirs = facets_of(two, -1)
+def in_space(side1: Side, side2: Side) -> Coupled:
+    """Couple sides of solid bodies: what do looks see, what do they cover, then D and M."""
+    ours = facets_of(side1, 1)
+    theirs = facets_of(side2, -1)
     from scipy.spatial import cKDTree  # late: it takes a while
 
     tree = cKDTree(theirs.middles)
-    looks = looks_of(ours, one.nodes)
+    looks = looks_of(ours, side1.nodes)
     blocks = []
     # cut and integrate some looks at a time; those with nothing in front of them are left out
     for rows in np.array_split(np.arange(len(looks.nodes)), 1 + len(looks.nodes) // BLOCK):
@@ -240,18 +246,20 @@ def in_space(one: Side, two: Side) -> Coupled:
         some = looks.pick(rows)
         pieces, covered = opposite(some, theirs, tree)
         pieces = pieces.pick(np.flatnonzero((covered > ROUND_OFF)[pieces.look]))
-        kept, look = np.unique(pieces.look, return_inverse=True)
-        if not len(kept):
+        # number the looks anew that have pieces
+        with_pieces, look = np.unique(pieces.look, return_inverse=True)
+        if not len(with_pieces):
             continue
-        some = some.pick(kept)
+        some = some.pick(with_pieces)
         pieces = replace(pieces, look=look.ravel())
-        blocks.append(_Block(some, pieces, covered[kept], *integrals(some, pieces)))
-    covered_parts = _covered(ours, blocks, common_nodes(one, two) >= 0)
-    return coupled(covered_parts, lambda carried: _assembled(one, two, theirs, blocks, carried))
+        own, mixed = integrate(some, pieces)
+        blocks.append(_Block(some, pieces, covered[with_pieces], own, mixed))
+    covered_parts = _measure_cover(ours, blocks, common_nodes(side1, side2) >= 0)
+    return couple(covered_parts, lambda carried: _assemble(side1, side2, theirs, blocks, carried))
 
 
-def _covered(ours: Facets, blocks: Sequence[_Block], common: Mask) -> Covered:
-    """Return what is covered of the looks of these blocks, of each for the nodes that ask.
+def _measure_cover(ours: Facets, blocks: Sequence[_Block], common: Mask) -> Covered:
+    """Measure what is covered of the looks of these blocks, of each for the nodes that ask.
 
     Args:
         ours: the facets of side 1.
@@ -287,29 +295,29 @@ def _whole_weights(looks: Looks) -> Array:
     places, weights = rule(3)
     phi = hats(looks.polygons[piece], np.einsum("qc,kcx->kqx", places, corners))
     sizes = areas(corners) / looks.slant[piece]
-    return summed(piece, np.einsum("q,kqv,k->kv", weights, phi, sizes), k).reshape(k, v)
+    return sum_rows(piece, np.einsum("q,kqv,k->kv", weights, phi, sizes), k).reshape(k, v)
 
 
-def _assembled(
-    one: Side, two: Side, theirs: Facets, blocks: Sequence[_Block], carried: Carried
+def _assemble(
+    side1: Side, side2: Side, theirs: Facets, blocks: Sequence[_Block], carried: Carried
 ) -> tuple[Array, sp.csr_matrix, Array]:
     """Return D (m,), M (m, n) and by how much facets of one curved face may overlap (m,) [m].
 
     Args:
-        one: side 1, of m nodes.
-        two: side 2, of n nodes.
+        side1: side 1, of m nodes.
+        side2: side 2, of n nodes.
         theirs: the facets of side 2.
         blocks: the looks of side 1, some at a time.
         carried: nodes that others carry.
     """
-    m = len(one.nodes.points)
-    n = len(two.nodes.points)
-    partner = common_nodes(one, two)
+    m = len(side1.nodes.points)
+    n = len(side2.nodes.points)
+    partner = common_nodes(side1, side2)
     D = np.zeros(m)
     overlap = np.zeros(m)
-    parts = [sp.coo_matrix((m, n))]
-    start = 0
-    points = one.nodes.points
+    parts = [sp.coo_matrix((m, n))]  # of M
+    start = 0  # of the rows of ``carried`` that are those of a block
+    points = side1.nodes.points
     H = curvatures(theirs.corners, theirs.nodes, theirs.normals)
     curved = bool(np.any(np.linalg.norm(H, axis=(1, 2)) * theirs.reach > PLANE))
     for block in blocks:
@@ -324,29 +332,30 @@ def _assembled(
         borne = carried.nodes[some.nodes] & some.asking
         asking = (some.asking & used & ~borne)[:, :, None]
         common = partner[some.nodes]
-        functions = dual(some, own, (block.covered >= 1.0 - WHOLE) & ~borne.any(axis=1))
-        functions, own_D, forces = handed_over(functions, own.sum(axis=2), common >= 0)
+        functions = make_dual(some, own, (block.covered >= 1.0 - WHOLE) & ~borne.any(axis=1))
+        functions, own_D, forces = hand_over(functions, own.sum(axis=2), common >= 0)
         # their share in M and D, and what they pass to nodes of both sides
         values = (functions * asking)[pieces.look] @ block.mixed
-        parts.append(entries(values, some.nodes[pieces.look], theirs.nodes[pieces.facet], m, n))
+        parts.append(sum_entries(values, some.nodes[pieces.look], theirs.nodes[pieces.facet], m, n))
         if (common >= 0).any():
-            parts.append(entries(-forces * asking, some.nodes, common, m, n))
+            parts.append(sum_entries(-forces * asking, some.nodes, common, m, n))
         np.add.at(D, some.nodes, own_D * asking[:, :, 0])
+        # what facets of one curved face may overlap, also where functions are carried on
         if curved:
-            piece = _overlap(points[some.nodes], theirs, H, block)[:, None]
+            piece = _find_overlap(points[some.nodes], theirs, H, block)[:, None]
             np.maximum.at(overlap, some.nodes[pieces.look], piece * some.asking[pieces.look])
             np.maximum.at(
                 overlap, by[pieces.look], FARTHER * piece * borne.any(axis=1)[pieces.look, None]
             )
         if borne.any():
-            parts.append(_carry(D, one.nodes.points, theirs, block, by, borne, n))
+            parts.append(_carry(D, side1.nodes.points, theirs, block, by, borne, n))
     values = np.concatenate([part.data for part in parts])
     rows_of_values = np.concatenate([part.row for part in parts])
     columns = np.concatenate([part.col for part in parts])
     return D, sp.csr_matrix((values, (rows_of_values, columns)), shape=(m, n)), overlap
 
 
-def _overlap(corners: Array, theirs: Facets, H: Array, block: _Block) -> Array:
+def _find_overlap(corners: Array, theirs: Facets, H: Array, block: _Block) -> Array:
     """Return by how much the pieces (k,) of looks may overlap facets of one curved face [m].
 
     It is the most at the corners and in the middle of each.
@@ -360,9 +369,9 @@ def _overlap(corners: Array, theirs: Facets, H: Array, block: _Block) -> Array:
     looks = block.looks
     pieces = block.pieces
     points = np.concatenate([pieces.polygons, pieces.polygons.mean(axis=1, keepdims=True)], axis=1)
-    one = hats(looks.polygons[pieces.look], points), corners[pieces.look]
-    two = hats(pieces.seen, points), theirs.corners[pieces.facet]
-    return may_overlap(H[pieces.facet], one, two)
+    facet1 = hats(looks.polygons[pieces.look], points), corners[pieces.look]
+    facet2 = hats(pieces.seen, points), theirs.corners[pieces.facet]
+    return may_overlap(H[pieces.facet], facet1, facet2)
 
 
 def _carry(
@@ -387,18 +396,17 @@ def _carry(
     place[rows] = np.arange(len(rows))
     own = block.own[rows]
     # E of the nodes that carry, as the look sees them, and their weights D_k = sum_t E_tk D_t
-    there = points[by[rows]] - some.middles[:, None, :]
-    seen = np.einsum("kvi,kic->kvc", there, some.frames)
+    offset = points[by[rows]] - some.middles[:, None, :]
+    seen = np.einsum("kvi,kic->kvc", offset, some.frames)
     shares = extrapolation(seen, some.polygons) * borne[rows][:, :, None]
     weights = np.einsum("kpv,kp->kv", shares, own.sum(axis=2))
     np.add.at(D, by[rows], weights)
     # psi_k = D_k b(x)ᵀ G⁻¹ b(x_k), in the functions of the facet: b(x) = sum_i b(x_i) phi_i
-    nodal, inverse, offset = linear_functions(some, own)
-    beyond = np.concatenate(
-        [np.ones((*seen.shape[:2], 1)), (seen - offset) / some.reach[:, None, None]], axis=2
-    )
+    nodal, inverse, middles = linear_functions(some, own)
+    ones = np.ones((*seen.shape[:2], 1))
+    beyond = np.concatenate([ones, (seen - middles) / some.reach[:, None, None]], axis=2)
     functions = weights[:, :, None] * (beyond @ inverse @ nodal.swapaxes(1, 2))
     among = np.flatnonzero(place[pieces.look] >= 0)
     look = place[pieces.look[among]]
     values = functions[look] @ block.mixed[among]
-    return entries(values, by[rows][look], theirs.nodes[pieces.facet[among]], len(points), n)
+    return sum_entries(values, by[rows][look], theirs.nodes[pieces.facet[among]], len(points), n)

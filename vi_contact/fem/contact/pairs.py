@@ -1,6 +1,4 @@
-"""Make contact between two deformable bodies.
-
-The unknowns of side 1 become displacements relative to side 2.
+"""Make contact between two deformable bodies: unknowns of side 1 relative to side 2.
 
 Opposite node s of side 1 with frame Q_s = (n, t), the other body moves by sum_j P_sj u_j. With û_s
 = Q_sᵀ u_s, the unknowns û of the nodal frames are written in new ones ǔ,
@@ -11,6 +9,10 @@ so that the relative normal displacement ǔ_n is one unknown again: ǔ_n <= gap0
 friction acts on ǔ_t, and the work of a reaction on ǔ is that of the pair of forces r on side 1 and
 -P_sjᵀ r on side 2: action is reaction. n is the outward normal of side 1, from side 1 to side 2.
 Displacements are small: nobody's partner changes.
+
+Both sides are gathered on every rank, which all do the same work up to the gaps; then each keeps
+the conditions of its own nodes. Sides are ``Side`` (``matching``), what nodes of side 1 face is
+``Matched``; ``_match_faces`` matches the faces of side 1 one by one.
 """
 
 import logging
@@ -31,18 +33,17 @@ from ...core.timing import report_time
 from ...meshes.rows import number_alike
 from ..body.space import FemSpace
 from ..mesh.tagged_mesh import Facets
-from .borrowing import Borrowed, borrowed
-from .bubbles import averaged
+from .borrowing import Borrowed, borrow
+from .bubbles import average_bubbles
 from .counting import census_of_all, tell
 from .covering import LEAST_SHARE
-from .faces import boundary, checked_angle, split, tell_corners
-from .frames import Facing, NodalConditions, snapped, surface_of
-from .hinges import hinges as hinge_numbers
-from .hinges import refuse_hinges
+from .faces import check_angle, gather_boundary, split_at_corners, tell_corners
+from .frames import Facing, NodalConditions, snap_to_axes, surface_of
+from .hinges import find_hinges, refuse_hinges
 from .matching import Matched, Matching, NodeToNode, Side
-from .nodes import Nodes, everywhere, joined_nodes
-from .surface import contact_space, listed, merged, nodes_on, prescribed_motion
-from .watching import Watched, clamped_or_prescribed, watched_nodes
+from .nodes import Nodes, everywhere, join_nodes
+from .surface import contact_space, find_listed, make_prescribed_motion, merge_tied, nodes_on
+from .watching import Watched, sort_held, watch_nodes
 
 log = logging.getLogger(__name__)
 
@@ -96,84 +97,73 @@ def contact_pair(
             each other, bodies that overlap, sides of one and the same boundary, contact directions
             that are partly prescribed, clamped nodes that face free ones.
     """
-    space, angle = _checked_pair(system, facets1, facets2, points, matching, feature_angle)
+    space, angle = _check_pair(system, facets1, facets2, points, matching, feature_angle)
     flag("contact_pair", "hinges", hinges)
+    if matching is None:
+        matching = NodeToNode()
 
     # what faces what: nodes of both sides, and of each face of side 1 what it has in front
-    one, two, shared = _two_sides(space, facets1, facets2)
-    hinge = _hinges(space, one, two, shared, allowed=hinges)
-    one = replace(one, tied=_tied_over(space, one, two))
-    tied = one.nodes.numbers[np.asarray(one.tied) >= 0]
-    faces = _faces(space, facets1, one, angle)
+    side1, side2, shared = _two_sides(space, facets1, facets2)
+    hinge = _mark_hinges(space, side1, side2, shared, allowed=hinges)
+    side1 = replace(side1, tied=_find_tied_over(space, side1, side2))
+    faces = _divide_faces(space, facets1, side1, angle)
     with together(space.comm):  # a matching of the user's may fail on one rank
-        nodes, matched = _by_face(
-            faces, two, NodeToNode() if matching is None else matching, space.size
-        )
-    opposite = np.concatenate([nodes.numbers, matched.carried])
-    carried = np.setdiff1d(matched.carried, nodes.numbers)
+        nodes, matched = _match_faces(faces, side2, matching, space.size)
 
-    # which nodes have a condition, and what became of the others: those of both sides, tied over,
-    # clamped or prescribed, hardly covered, not listed
-    kept = ~np.isin(nodes.numbers, np.union1d(two.nodes.numbers, tied))
-    nodes = nodes.pick(kept)
-    matched = matched.pick(kept)
-    free = _unclamped(space, one.name, nodes, two, matched)
-    kinds = _kinds(one, shared, opposite, nodes.numbers[~free])
-    kinds |= _sorted_out(space, one, kinds["clamped"])
-    watched = (
-        _watched(space, one, two, nodes.pick(~free), matched.pick(~free)) if points is None else ()
+    # which nodes have a condition, and what became of the others
+    nodes, matched, kinds, watched = _sort_nodes(
+        space, side1, side2, nodes, matched, shared=shared, hinge=hinge, watch=points is None
     )
-    kinds["partly covered"] = np.isin(one.nodes.numbers, carried)
-    little = nodes.numbers[free & (matched.shares < LEAST_SHARE)]
-    kinds["hardly covered"] = np.isin(one.nodes.numbers, little)
-    _warn_of_coarse(space, one, two, little)
-    kinds |= {
-        "shared with another body": hinge & ~shared,
-        "tied to the other side": np.isin(one.nodes.numbers, tied),
-    }
-    kinds["in front of nothing"] &= ~kinds["tied to the other side"]
-    nodes = nodes.pick(free)
-    matched = matched.pick(free)
     if points is not None:
-        nodes, matched, kinds["not listed"] = _pick_listed(space, one, nodes, matched, points)
+        nodes, matched, kinds["not listed"] = _pick_listed(space, side1, nodes, matched, points)
 
     # gaps along the normals; nodes that are tied to one another share one condition
     alone = nodes.numbers
-    directions = snapped(nodes.normals)
-    gap = _gap(space, one.name, two, nodes, directions, matched)
+    directions = snap_to_axes(nodes.normals)
+    gap = _measure_gap(space, side1.name, side2, nodes, directions, matched)
     P = matched.P
     if len(space.tied_nodes):
-        nodes, directions, shares = merged(space, one.name, nodes, directions, angle)
+        nodes, directions, shares = merge_tied(space, side1.name, nodes, directions, angle)
         gap = shares @ gap
         P = sp.csr_matrix(shares @ P)
-        kinds["tied to another"] = np.isin(one.nodes.numbers, np.setdiff1d(alone, nodes.numbers))
-    uncovered = np.isin(nodes.numbers, little)
-    census = census_of_all(one.name, one.nodes, kinds, len(nodes.numbers))
+        kinds["tied to another"] = np.isin(side1.nodes.numbers, np.setdiff1d(alone, nodes.numbers))
+    uncovered = np.isin(nodes.numbers, side1.nodes.numbers[kinds["hardly covered"]])
+    some_uncovered = bool(uncovered.any())
+    census = census_of_all(side1.name, side1.nodes, kinds, len(nodes.numbers))
     tell(space.comm, census)
 
     # from here on every rank has its own nodes of side 1
     slots = np.flatnonzero(space.blocks_of(nodes.numbers) >= 0)
     nodes = nodes.pick(slots)
-    tell_corners(space, one.name, nodes, slots, angle)
-    bubbles = averaged(space, facets1, nodes) + averaged(space, facets2, two.nodes, P[slots])
-    beside = _borrowed(space, facets1, one, kinds, nodes.numbers[~uncovered[slots]])
+    directions = directions[slots]
+    gap = gap[slots]
+    P = P[slots]
+    uncovered = uncovered[slots]
+    tell_corners(space, side1.name, nodes, slots, angle)
+    own_bubbles = average_bubbles(space, facets1, nodes)
+    their_bubbles = average_bubbles(space, facets2, side2.nodes, P)
     conditions = NodalConditions(
-        nodes, directions[slots], slots, Facing(two.nodes, P[slots]), bubbles, beside
+        nodes,
+        directions,
+        slots,
+        facing=Facing(side2.nodes, P),
+        bubbles=own_bubbles + their_bubbles,
+        borrowed=_borrow(space, facets1, side1, kinds, nodes.numbers[~uncovered]),
     )
     surface = surface_of(
         space,
         [conditions],
-        gap0=gap[slots],
+        gap0=gap,
         weights=nodes.weights * space.forms.section.thickness,
         censuses=(census,),
         watched=watched,
     )
-    if uncovered.any():
-        surface = replace(surface, uncovered=uncovered[slots])
-    return replace(surface, **prescribed_motion(space, conditions))
+    if some_uncovered:
+        surface = replace(surface, uncovered=uncovered)
+    return replace(surface, **make_prescribed_motion(space, conditions))
 
 
-def _checked_pair(
+def _check_pair(
     system: SemiDiscreteSystem,
     facets1: Facets,
     facets2: Facets,
@@ -181,15 +171,18 @@ def _checked_pair(
     matching: Matching | None,
     feature_angle: float,
 ) -> tuple[FemSpace, float]:
-    """Return the space of the system and the angle [rad]; InputError for wrong arguments.
+    """Return the space of the system and the feature angle as a float [rad]. Collective.
 
     Args:
         system: the system of both bodies.
         facets1: side 1.
         facets2: side 2.
         points: a list of coordinates, or None.
-        matching: how nodes find what they face.
+        matching: how nodes find what they face, or None.
         feature_angle: [rad].
+
+    Raises:
+        InputError: on all ranks, wrong arguments.
     """
     space = contact_space(
         "contact_pair",
@@ -207,7 +200,7 @@ def _checked_pair(
         ("match",),
         "give NodeToNode() or DualMortar(), or None",
     )
-    angle = checked_angle("contact_pair", feature_angle)
+    angle = check_angle("contact_pair", feature_angle)
     if space.hierarchy is not None and not isinstance(matching or NodeToNode(), NodeToNode):
         raise InputError(
             "contact_pair: sides of P2 tetrahedra are matched by matching=NodeToNode() only: mesh "
@@ -217,51 +210,55 @@ def _checked_pair(
 
 
 def _two_sides(space: FemSpace, facets1: Facets, facets2: Facets) -> tuple[Side, Side, Mask]:
-    """Return both sides, and which nodes of side 1 are shared; InputError unless they can part.
-
-    Collective.
+    """Return both sides, and a mask of the nodes of side 1 that side 2 has too. Collective.
 
     Args:
         space: the bodies' unknowns.
         facets1: side 1.
         facets2: side 2.
+
+    Raises:
+        InputError: sides of the same nodes, and a facet on both sides: nothing can part there.
     """
-    one = side_of(space, facets1)
-    two = side_of(space, facets2)
-    shared = np.isin(one.nodes.numbers, two.nodes.numbers)
+    side1 = side_of(space, facets1)
+    side2 = side_of(space, facets2)
+    shared = np.isin(side1.nodes.numbers, side2.nodes.numbers)
     if shared.all():
         raise InputError(
-            f"'{one.name}' and '{two.name}' are the same nodes, so that nothing can part there: "
-            "mesh the bodies one by one, or cut the mesh open (meshes.cut.CutOpen)"
+            f"'{side1.name}' and '{side2.name}' are the same nodes, so that nothing can part "
+            "there: mesh the bodies one by one, or cut the mesh open (meshes.cut.CutOpen)"
         )
-    _refuse_common(one, two)
-    return one, two, shared
+    _refuse_common(side1, side2)
+    return side1, side2, shared
 
 
 def _pick_listed(
     space: FemSpace,
-    one: Side,
+    side1: Side,
     nodes: Nodes,
     matched: Matched,
     points: Sequence[Sequence[float]],
 ) -> tuple[Nodes, Matched, Mask]:
-    """Return the nodes nearest to the points, in their order, and which of side 1 are not.
+    """Return the conditions at the nodes nearest to points, in their order, and who is left out.
 
     Args:
         space: the bodies' unknowns.
-        one: side 1.
+        side1: side 1.
         nodes: those of it with a condition.
         matched: what they face.
         points: (k, d) coordinates [m].
+
+    Returns:
+        nodes and what they face, and a mask of the nodes of side 1 that are not listed.
     """
-    chosen = listed(space, nodes, points, one.name)
+    chosen = find_listed(space, nodes, points, side1.name)
     rows = np.concatenate([np.flatnonzero(nodes.numbers == number) for number in chosen])
-    others = np.isin(one.nodes.numbers, np.setdiff1d(nodes.numbers, chosen))
+    others = np.isin(side1.nodes.numbers, np.setdiff1d(nodes.numbers, chosen))
     return nodes.pick(rows), matched.pick(rows), others
 
 
 def side_of(space: FemSpace, facets: Facets) -> Side:
-    """Gather all nodes and facets of a boundary, on every rank, in the order of the mesh's numbers.
+    """Gather a boundary on every rank: nodes in the order of their numbers, each facet once.
 
     Collective.
     """
@@ -273,16 +270,72 @@ def side_of(space: FemSpace, facets: Facets) -> Side:
     return Side(facets.name, nodes, np.searchsorted(nodes.numbers, rows[first]))
 
 
-def _kinds(one: Side, shared: Mask, opposite: Indices, clamped: Indices) -> dict[str, Mask]:
-    """Return kind -> mask of the nodes of side 1 without a condition.
+def _sort_nodes(
+    space: FemSpace,
+    side1: Side,
+    side2: Side,
+    nodes: Nodes,
+    matched: Matched,
+    *,
+    shared: Mask,
+    hinge: Mask,
+    watch: bool,
+) -> tuple[Nodes, Matched, dict[str, Mask], tuple[Watched, ...]]:
+    """Sort the matched nodes into those with a condition and others. Collective.
 
     Args:
-        one: side 1, of m nodes.
+        space: the bodies' unknowns.
+        side1: side 1, of m nodes.
+        side2: side 2.
+        nodes: the matched nodes of side 1, a row for each face.
+        matched: what they face.
+        shared: (m,) nodes of both sides.
+        hinge: (m,) nodes that only glue bodies together.
+        watch: whether nodes that are prescribed in every component are watched.
+
+    Returns:
+        the nodes with a condition, what they face, kind -> mask (m,) of all others and of those
+        with hardly anything in front of them, and what watches prescribed ones.
+    """
+    # nodes of both sides, and nodes tied over, cannot part
+    tied = side1.nodes.numbers[np.asarray(side1.tied) >= 0]
+    opposite = np.concatenate([nodes.numbers, matched.carried])
+    carried = np.setdiff1d(matched.carried, nodes.numbers)
+    can_part = ~np.isin(nodes.numbers, np.union1d(side2.nodes.numbers, tied))
+    nodes = nodes.pick(can_part)
+    matched = matched.pick(can_part)
+
+    # nodes that are held in every component have no condition
+    free = _find_unclamped(space, side1.name, nodes, side2, matched)
+    kinds = _sort_kinds(side1, shared, opposite, nodes.numbers[~free])
+    kinds |= _sort_held_anywhere(space, side1, kinds["clamped"])
+    watched: tuple[Watched, ...] = ()
+    if watch:
+        watched = _watch_held(space, side1, side2, nodes.pick(~free), matched.pick(~free))
+
+    # what lies in front of the others: others carry nodes with little, if there are any
+    kinds["partly covered"] = np.isin(side1.nodes.numbers, carried)
+    little = nodes.numbers[free & (matched.shares < LEAST_SHARE)]
+    kinds["hardly covered"] = np.isin(side1.nodes.numbers, little)
+    _warn_of_coarse(space, side1, side2, little)
+    kinds |= {
+        "shared with another body": hinge & ~shared,
+        "tied to the other side": np.isin(side1.nodes.numbers, tied),
+    }
+    kinds["in front of nothing"] &= ~kinds["tied to the other side"]
+    return nodes.pick(free), matched.pick(free), kinds, watched
+
+
+def _sort_kinds(side1: Side, shared: Mask, opposite: Indices, clamped: Indices) -> dict[str, Mask]:
+    """Return kind -> mask (m,) of the nodes of side 1 that have no condition, as a census says it.
+
+    Args:
+        side1: side 1, of m nodes.
         shared: (m,) nodes of both sides.
         opposite: numbers of those in front of side 2.
         clamped: numbers of those that are clamped.
     """
-    numbers = one.nodes.numbers
+    numbers = side1.nodes.numbers
     return {
         "shared by both sides": shared,
         "clamped": np.isin(numbers, clamped),
@@ -290,235 +343,250 @@ def _kinds(one: Side, shared: Mask, opposite: Indices, clamped: Indices) -> dict
     }
 
 
-def _warn_of_coarse(space: FemSpace, one: Side, two: Side, little: Indices) -> None:
+def _warn_of_coarse(space: FemSpace, side1: Side, side2: Side, little: Indices) -> None:
     """Warn, on rank 0, of nodes with a condition around which little of side 1 is covered.
 
     Args:
         space: the bodies' unknowns.
-        one: side 1.
-        two: side 2.
+        side1: side 1.
+        side2: side 2.
         little: numbers of these nodes.
     """
     if len(little) and space.comm.rank == 0:
-        where = describe_point(one.nodes.points[np.searchsorted(one.nodes.numbers, little[0])])
+        where = describe_point(side1.nodes.points[np.searchsorted(side1.nodes.numbers, little[0])])
         log.warning(
             "%d contact nodes of '%s', the first at %s, have hardly anything of '%s' in front of "
             "their facets, and no whole facet is near: their pressures are left out of the largest "
             "ones; make '%s' the first side, or mesh '%s' finer",
             len(little),
-            one.name,
+            side1.name,
             where,
-            two.name,
-            two.name,
-            one.name,
+            side2.name,
+            side2.name,
+            side1.name,
         )
 
 
-def _sorted_out(space: FemSpace, one: Side, clamped: Mask) -> dict[str, Mask]:
+def _sort_held_anywhere(space: FemSpace, side1: Side, clamped: Mask) -> dict[str, Mask]:
     """Return kind -> mask of the nodes of side 1 held in every component, at rest or moved.
 
     Collective.
 
     Args:
         space: the bodies' unknowns.
-        one: side 1, of m nodes.
+        side1: side 1, of m nodes.
         clamped: (m,) nodes held in every component.
     """
-    sorted_out = clamped_or_prescribed(space, one.nodes, clamped)
-    moved = space.comm.max(sorted_out["prescribed"].astype(float)) > 0.0
+    # a rank knows of its own nodes only whether something moves them
+    own = sort_held(space, side1.nodes, clamped)
+    moved = space.comm.max(own["prescribed"].astype(float)) > 0.0
     return {"clamped": clamped & ~moved, "prescribed": clamped & moved}
 
 
-def _watched(
-    space: FemSpace, one: Side, two: Side, nodes: Nodes, matched: Matched
+def _watch_held(
+    space: FemSpace, side1: Side, side2: Side, nodes: Nodes, matched: Matched
 ) -> tuple[Watched, ...]:
     """Return what watches nodes of side 1 that are held in every component. Collective.
 
-    They are given of all ranks, and in front of others that are held so too.
+    Only those in front of nodes that are held so too are watched.
 
     Args:
         space: the bodies' unknowns.
-        one: side 1.
-        two: side 2.
-        nodes: nodes of side 1, of all ranks.
+        side1: side 1.
+        side2: side 2.
+        nodes: the held nodes of side 1, of all ranks.
         matched: what they face.
     """
-    known = np.asarray(matched.P @ (~two.nodes.held.all(axis=1)).astype(float)) == 0.0
+    # what faces no free node of side 2
+    free_share = matched.P @ (~side2.nodes.held.all(axis=1)).astype(float)
+    known = np.asarray(free_share) == 0.0
     nodes = nodes.pick(known)
     matched = matched.pick(np.flatnonzero(known))
     if not len(nodes.numbers):
         return ()
-    directions = snapped(nodes.normals)
-    gap = _gap(space, one.name, two, nodes, directions, matched)
+    directions = snap_to_axes(nodes.normals)
+    gap = _measure_gap(space, side1.name, side2, nodes, directions, matched)
     own = np.flatnonzero(space.blocks_of(nodes.numbers) >= 0)
-    opposite = Facing(two.nodes, sp.csr_matrix(matched.P[own]))
-    return watched_nodes(
-        space, one.name, nodes.pick(own), directions[own], gap[own], opposite, two.name
+    opposite = Facing(side2.nodes, sp.csr_matrix(matched.P[own]))
+    return watch_nodes(
+        space, side1.name, nodes.pick(own), directions[own], gap[own], opposite, side2.name
     )
 
 
-def _borrowed(
-    space: FemSpace, facets: Facets, one: Side, kinds: dict[str, Mask], having: Indices
+def _borrow(
+    space: FemSpace, facets: Facets, side1: Side, kinds: dict[str, Mask], having: Indices
 ) -> Borrowed | None:
-    """Return what nodes of side 1 without a pressure of their own take of neighbours.
+    """Return what nodes of side 1 without a pressure of their own take of neighbours. Collective.
 
-    Those in front of nothing are left out.
+    Nodes in front of nothing take none: there the pressure is zero.
 
     Args:
         space: the bodies' unknowns.
         facets: those of side 1.
-        one: side 1.
+        side1: side 1.
         kinds: what became of its nodes.
         having: numbers of this rank's nodes with a pressure.
     """
-    nothing = [
-        mask for kind, mask in kinds.items() if kind not in ("in front of nothing", "not listed")
-    ]
-    return borrowed(space, facets, one.nodes.numbers[np.any(nothing, axis=0)], having)
+    without = np.any(
+        [mask for kind, mask in kinds.items() if kind not in ("in front of nothing", "not listed")],
+        axis=0,
+    )
+    return borrow(space, facets, side1.nodes.numbers[without], having)
 
 
-def _hinges(space: FemSpace, one: Side, two: Side, shared: Mask, *, allowed: bool) -> Mask:
-    """Return which nodes of side 1 only glue bodies together. Collective.
+def _mark_hinges(space: FemSpace, side1: Side, side2: Side, shared: Mask, *, allowed: bool) -> Mask:
+    """Return a mask (m,) of the nodes of side 1 that only glue bodies together. Collective.
 
     Args:
         space: the bodies' unknowns.
-        one: side 1, of m nodes.
-        two: side 2.
+        side1: side 1, of m nodes.
+        side2: side 2.
         shared: (m,) nodes of both sides.
         allowed: whether bodies may hang together so.
 
     Raises:
         InputError: there are some, and they are not ``allowed``.
     """
-    numbers = np.union1d(one.nodes.numbers, two.nodes.numbers)
-    clamped = [side.nodes.numbers[side.nodes.held.all(axis=1)] for side in (one, two)]
-    found = hinge_numbers(space, np.setdiff1d(numbers, np.concatenate(clamped)))
-    here = np.isin(one.nodes.numbers, found)
+    numbers = np.union1d(side1.nodes.numbers, side2.nodes.numbers)
+    clamped = [side.nodes.numbers[side.nodes.held.all(axis=1)] for side in (side1, side2)]
+    hinges = find_hinges(space, np.setdiff1d(numbers, np.concatenate(clamped)))
+    here = np.isin(side1.nodes.numbers, hinges)
     if not allowed:
-        refuse_hinges("contact_pair", (one.name, two.name), one.nodes.points[here & shared])
-        for side in (one, two):
-            refuse_hinges(
-                "contact_pair", (side.name,), side.nodes.points[np.isin(side.nodes.numbers, found)]
-            )
+        refuse_hinges("contact_pair", (side1.name, side2.name), side1.nodes.points[here & shared])
+        for side in (side1, side2):
+            there = np.isin(side.nodes.numbers, hinges)
+            refuse_hinges("contact_pair", (side.name,), side.nodes.points[there])
     return np.asarray(here)
 
 
-def _tied_over(space: FemSpace, one: Side, two: Side) -> Indices:
-    """Return the places (m,) on side 2 of the nodes to which those of side 1 are tied.
+def _find_tied_over(space: FemSpace, side1: Side, side2: Side) -> Indices:
+    """Find the nodes of side 2 to which those of side 1 are tied in all components.
 
-    They are tied in all components; of several, as where ties meet, the nearest; -1 for others.
-    They cannot part, as the two sides of a weld.
+    Such nodes cannot part, as the two sides of a weld.
 
     Args:
         space: the bodies' unknowns.
-        one: side 1, of m nodes.
-        two: side 2.
+        side1: side 1, of m nodes.
+        side2: side 2.
+
+    Returns:
+        (m,) places on side 2; of several, as where ties meet, the nearest one; -1 for none.
     """
-    places = np.full(len(one.nodes.numbers), -1)
+    places = np.full(len(side1.nodes.numbers), -1)
     if not len(space.tied_nodes):
         return places
-    own = space.leaders(one.nodes.numbers)
-    others = space.leaders(two.nodes.numbers)
-    for row in np.flatnonzero(
-        np.isin(one.nodes.numbers, space.tied_nodes) & (own >= 0) & np.isin(own, others)
-    ):
+    # nodes that follow one leader move as one
+    own = space.leaders(side1.nodes.numbers)
+    others = space.leaders(side2.nodes.numbers)
+    tied = np.isin(side1.nodes.numbers, space.tied_nodes) & (own >= 0) & np.isin(own, others)
+    for row in np.flatnonzero(tied):
         alike = np.flatnonzero(others == own[row])
-        apart = np.linalg.norm(two.nodes.points[alike] - one.nodes.points[row], axis=1)
+        apart = np.linalg.norm(side2.nodes.points[alike] - side1.nodes.points[row], axis=1)
         places[row] = alike[np.argmin(apart)]
     return places
 
 
-def _refuse_common(one: Side, two: Side) -> None:
+def _refuse_common(side1: Side, side2: Side) -> None:
     """Raise InputError for a facet that is listed on both sides."""
-    own, others = number_alike(*(side.nodes.numbers[side.facets] for side in (one, two)))
+    own, others = number_alike(*(side.nodes.numbers[side.facets] for side in (side1, side2)))
     for facet in np.flatnonzero(np.isin(own, others))[:1]:
-        where = describe_point(one.nodes.points[one.facets[facet]].mean(axis=0))
+        where = describe_point(side1.nodes.points[side1.facets[facet]].mean(axis=0))
         raise InputError(
-            f"a facet of both '{one.name}' and '{two.name}' at {where}: a facet cannot touch "
+            f"a facet of both '{side1.name}' and '{side2.name}' at {where}: a facet cannot touch "
             "itself, so list it on one side only"
         )
 
 
-def _faces(space: FemSpace, facets1: Facets, one: Side, angle: float) -> list[tuple[Side, Array]]:
-    """Return the smooth faces of side 1, and the normals of their nodes over the whole side.
-
-    Collective.
+def _divide_faces(
+    space: FemSpace, facets1: Facets, side1: Side, angle: float
+) -> list[tuple[Side, Array]]:
+    """Divide side 1 into its smooth faces, each a side by itself. Collective.
 
     Args:
         space: the bodies' unknowns.
         facets1: the facets of side 1.
-        one: side 1.
+        side1: side 1.
         angle: that up to which facets round a node are one face [rad].
 
     Returns:
-        pairs of a side, with normals and weights of its own, and normals (n, d).
+        pairs of a face, with normals and weights of its own, and the normals (n, d) that its nodes
+        have over the whole of side 1.
 
     Raises:
         InputError: a face that meets itself.
     """
     # the facets of all ranks are gathered only where some of them may turn so far
-    around = boundary(space, facets1, beyond=angle)
+    around = gather_boundary(space, facets1, beyond=angle)
     if len(around.vertices):
-        around = boundary(space, facets1)
-    nodes, facet = split(space, around, one.nodes, angle)
-    if len(nodes.numbers) == len(one.nodes.numbers):
-        return [(one, one.nodes.normals)]
+        around = gather_boundary(space, facets1)
+    nodes, facet = split_at_corners(space, around, side1.nodes, angle)
+    if len(nodes.numbers) == len(side1.nodes.numbers):
+        return [(side1, side1.nodes.normals)]
+
+    # each face has the nodes of its facets; of a node with several rows it has the one of the face
     face_of = around.faces(angle)
     faces = []
     for face in range(int(face_of.max()) + 1):
-        facets = one.facets[face_of == face]
+        facets = side1.facets[face_of == face]
         used = np.unique(facets)
-        inside = np.isin(nodes.numbers, one.nodes.numbers[used]) & (
+        inside = np.isin(nodes.numbers, side1.nodes.numbers[used]) & (
             (facet < 0) | (face_of[facet] == face)
         )
         own = nodes.pick(inside)
         if len(own.numbers) > len(used):
             again = own.points[1:][np.diff(own.numbers) == 0][0]
             raise InputError(
-                f"'{one.name}' turns round and meets itself at {describe_point(again)}: give it as "
-                "two boundaries (fem.joined_surfaces), or treat the corner as smooth (a larger "
+                f"'{side1.name}' turns round and meets itself at {describe_point(again)}: give "
+                f"it as two "
+                "boundaries (fem.joined_surfaces), or treat the corner as smooth (a larger "
                 "feature_angle=)"
             )
-        tied = None if one.tied is None else one.tied[used]
-        side = Side(one.name, own, np.searchsorted(used, facets), tied)
-        faces.append((side, one.nodes.normals[used]))
+        tied = None if side1.tied is None else side1.tied[used]
+        side = Side(side1.name, own, np.searchsorted(used, facets), tied)
+        faces.append((side, side1.nodes.normals[used]))
     return faces
 
 
-def _by_face(
-    faces: Sequence[tuple[Side, Array]], two: Side, matching: Matching, size: float
+def _match_faces(
+    faces: Sequence[tuple[Side, Array]], side2: Side, matching: Matching, size: float
 ) -> tuple[Nodes, Matched]:
-    """Return nodes with the normals and weights of their faces, and what they face.
+    """Match all faces of side 1, and put what they face together.
 
-    They are ordered by number; ``carried`` are numbers of nodes then. Faces in front of nothing are
-    left out where the matching leaves out parts of sides, unless all are.
+    Faces in front of nothing are left out where the matching leaves out parts of sides
+    (``partial``), unless all are.
 
     Args:
         faces: those of side 1, and the normals of their nodes over the whole side.
-        two: side 2.
+        side2: side 2.
         matching: how nodes find what they face.
         size: that of the mesh [m].
+
+    Returns:
+        the m matched nodes with the normals and weights of their faces, ordered by number, and what
+        they face, ``carried`` being numbers of nodes here.
     """
     refusal = None
-    found: list[tuple[Nodes, Matched]] = []
+    parts: list[Nodes] = []
+    matches: list[Matched] = []
     for side, mean in faces:
         try:
-            matched = _match(side, mean, two, matching, size)
+            matched = _match_face(side, mean, side2, matching, size)
         except InputError as error:
             if not getattr(matching, "partial", False):
                 raise
             refusal = refusal or error
         else:
+            parts.append(side.nodes.pick(matched.rows))
             carried = side.nodes.numbers[matched.carried]
-            found.append((side.nodes.pick(matched.rows), replace(matched, carried=carried)))
-    if refusal is not None and not found:
+            matches.append(replace(matched, carried=carried))
+    if refusal is not None and not matches:
         raise refusal
+
     # all faces together; a node of several of them has several rows, side by side
-    nodes = joined_nodes([nodes for nodes, _ in found])
+    nodes = join_nodes(parts)
     order = np.arange(len(nodes.numbers))
-    if len(found) > 1:
+    if len(parts) > 1:
         order = np.argsort(nodes.numbers, kind="stable")
-    matches = [matched for _, matched in found]
     weights = np.concatenate([matched.weights for matched in matches])
     whole = Matched(
         rows=np.arange(len(order)),
@@ -531,40 +599,44 @@ def _by_face(
     return replace(nodes, weights=weights).pick(order), whole.pick(order)
 
 
-def _match(side: Side, mean: Array, two: Side, matching: Matching, size: float) -> Matched:
-    """Return what a face of side 1 faces.
+def _match_face(side: Side, mean: Array, side2: Side, matching: Matching, size: float) -> Matched:
+    """Return what a face of side 1 faces: along its own normals, else along mean ones.
 
-    It is sought along its own normals or, since across a gap the partner of a corner lies on the
-    bisector, along the ``mean`` normals of its nodes. This is not so where a matching leaves out
-    what faces nothing: sides of a block would see the ground beside its base.
+    Across a gap the partner of a corner lies on the bisector of its faces, along the mean of their
+    normals. A matching that leaves out what faces nothing looks along the own normals only: sides
+    of a block would see the ground beside its base.
 
     Args:
         side: a face of side 1.
         mean: (n, d) normals of its nodes over the whole side.
-        two: side 2.
+        side2: side 2.
         matching: how nodes find what they face.
         size: that of the mesh [m].
     """
     try:
-        return matching.match(side, two, size)
+        return matching.match(side, side2, size)
     except InputError:
         if getattr(matching, "partial", False) or np.array_equal(mean, side.nodes.normals):
             raise
         try:
-            return matching.match(replace(side, nodes=replace(side.nodes, normals=mean)), two, size)
+            return matching.match(
+                replace(side, nodes=replace(side.nodes, normals=mean)), side2, size
+            )
         except InputError:
             pass
         raise
 
 
-def _unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched: Matched) -> Mask:
-    """Return which of the matched nodes are not clamped.
+def _find_unclamped(
+    space: FemSpace, name: str, nodes: Nodes, side2: Side, matched: Matched
+) -> Mask:
+    """Return a mask (m,) of the matched nodes that are not clamped.
 
     Args:
         space: the bodies' unknowns.
         name: that of side 1.
         nodes: its matched nodes.
-        two: side 2.
+        side2: side 2.
         matched: what they face.
 
     Raises:
@@ -572,33 +644,34 @@ def _unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched: Mat
     """
     clamped = nodes.held.all(axis=1)
     facing = np.asarray(matched.P.argmax(axis=1)).ravel()
-    lost = np.flatnonzero(clamped & ~two.nodes.held[facing].all(axis=1))
+    lost = np.flatnonzero(clamped & ~side2.nodes.held[facing].all(axis=1))
     if len(lost):
         raise InputError(
             f"contact node {describe_point(nodes.points[lost[0]])} of '{name}' is clamped but "
-            f"faces a free node of '{two.name}': make '{two.name}' the first side, or clamp less"
+            f"faces a free "
+            f"node of '{side2.name}': make '{side2.name}' the first side, or clamp less"
         )
     if clamped.all():
         raise InputError(
-            f"no contact nodes: every node of '{name}' that faces '{two.name}' is clamped, on both "
-            "sides or tied to the other side; clamp or tie less"
+            f"no contact nodes: every node of '{name}' that faces '{side2.name}' is clamped, on "
+            "both sides or tied to the other side; clamp or tie less"
         )
     if clamped.any() and space.comm.rank == 0:
         log.info("%d clamped nodes of '%s' are left out of the contact", clamped.sum(), name)
     return np.asarray(~clamped)
 
 
-def _gap(
-    space: FemSpace, name: str, two: Side, nodes: Nodes, directions: Array, matched: Matched
+def _measure_gap(
+    space: FemSpace, name: str, side2: Side, nodes: Nodes, directions: Array, matched: Matched
 ) -> Array:
-    """Return initial gaps n·(P x_2 - x_1) >= 0 [m].
+    """Return initial gaps n·(P x_2 - x_1) >= 0 (m,) [m].
 
     Overlaps of round-off (1e-12 of the mesh's size) or of polygons count as 0.
 
     Args:
         space: the bodies' unknowns.
         name: that of side 1.
-        two: side 2.
+        side2: side 2.
         nodes: m nodes of side 1.
         directions: (m, d) unit vectors n towards side 2.
         matched: what they face.
@@ -606,22 +679,23 @@ def _gap(
     Raises:
         InputError: a larger overlap.
     """
-    gap = np.sum((matched.P @ two.nodes.points - nodes.points) * directions, axis=1)
+    gap = np.sum((matched.P @ side2.nodes.points - nodes.points) * directions, axis=1)
     behind = -gap - np.maximum(matched.overlap, 1e-12 * space.size)
     if behind.max() > 0.0:
         worst = int(np.argmax(behind))
         raise InputError(
-            f"'{two.name}' lies {-gap[worst]:.3g} m behind '{name}' at "
-            f"{describe_point(nodes.points[worst])}: the bodies overlap there, or these are not "
-            "the boundaries between them; choose the sides that face, or draw the bodies in touch "
-            "and make a press fit by fem.InitialStrain, the strain of the body that is too large, "
-            "or by quasi_static on surface.moving(towards=…), its overlap"
+            f"'{side2.name}' lies {-gap[worst]:.3g} m behind '{name}' at "
+            f"{describe_point(nodes.points[worst])}"
+            ": the bodies overlap there, or these are not the boundaries between them; choose the "
+            "sides that face, or draw the bodies in touch and make a press fit by "
+            "fem.InitialStrain, the strain of the body that is too large, or by quasi_static on "
+            "surface.moving(towards=…), its overlap"
         )
     if gap.min() < -1e-12 * space.size and space.comm.rank == 0:
         log.warning(
             "'%s' and '%s' overlap by up to %.3g m: they count as touching there",
             name,
-            two.name,
+            side2.name,
             -gap.min(),
         )
     return np.maximum(gap, 0.0)

@@ -20,60 +20,69 @@ BORDER = 1e-6  # radians by which a direction may leave a facet's corner and cou
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Hold points (k, d) of nodes and facets (n, v), rows of their places."""
+    """Hold a side as points and facets.
+
+    Attributes:
+        points: (k, d) of its nodes [m].
+        facets: (n, v) places of their nodes.
+    """
 
     points: Array
     facets: Indices
 
     def around(self, node: int) -> Array:
-        """Return the nodes' points (m, v, d) of the facets at a node."""
+        """Return the points (m, v, d) [m] of the m facets at a node."""
         return self.points[self.facets[(self.facets == node).any(axis=1)]]
 
 
-def in_front(one: Surface, node: int, normal: Array, two: Surface, partner: int) -> Mask:
-    """Return in front of which facets at a node of side 1 (m,) those at its partner lie.
+def in_front(surface1: Surface, node: int, normal: Array, surface2: Surface, partner: int) -> Mask:
+    """Return a mask (m,) of the facets at a node that facets at its partner lie in front of.
 
-    They are seen along the normal.
+    They are seen along the normal, as corners of a plane round the node. A facet at the node counts
+    where its middle lies in the corner of a facet at the partner.
 
     Args:
-        one: side 1.
+        surface1: side 1.
         node: the place of the node on side 1.
         normal: (d,) its normal.
-        two: side 2.
+        surface2: side 2.
         partner: the place of its partner on side 2.
     """
     frame = make_nodal_frames(normal[None])[0][:, 1:]
-    ways = (one.around(node).mean(axis=1) - one.points[node]) @ frame
-    arms = (two.around(partner) - two.points[partner]) @ frame
-    found = np.zeros(len(ways), dtype=bool)
+    ways = (surface1.around(node).mean(axis=1) - surface1.points[node]) @ frame
+    arms = (surface2.around(partner) - surface2.points[partner]) @ frame
+    covered = np.zeros(len(ways), dtype=bool)
     for arm in arms:
-        found |= _within(ways, arm)
-    return found
+        covered |= _within(ways, arm)
+    return covered
 
 
-def one_of(
-    one: Surface,
+def choose_partner(
+    surface1: Surface,
     node: int,
     normal: Array,
-    two: Surface,
+    surface2: Surface,
     partners: Indices,
     apart: Array,
     close: float,
 ) -> int:
-    """Return which of several partners a node of side 1 faces; -1 where no single one is right.
+    """Choose among several partners the one that a node of side 1 faces.
 
     Args:
-        one: side 1.
+        surface1: side 1.
         node: the place of the node on side 1.
         normal: (d,) its normal.
-        two: side 2.
+        surface2: side 2.
         partners: (k,) places on side 2, of nodes that face this one. The first is taken where none
             has a facet in front of one of side 1, as where bodies meet at a corner only.
         apart: (k,) their distances [m]; partners that differ by up to ``close`` [m] are at one
             place.
         close: that distance [m].
+
+    Returns:
+        the place of the partner on side 2, -1 where no single one is right.
     """
-    seen = np.array([in_front(one, node, normal, two, partner) for partner in partners])
+    seen = np.array([in_front(surface1, node, normal, surface2, partner) for partner in partners])
     facing = np.flatnonzero(seen.any(axis=1))
     if len(facing) < 2:
         return int(partners[facing[0] if len(facing) else 0])
@@ -83,9 +92,11 @@ def one_of(
 
 
 def _within(ways: Array, arm: Array) -> Mask:
-    """Return which directions (m, d - 1) lie in the corner of a facet.
+    """Return a mask (m,) of the directions that lie in the corner of a facet.
 
-    The nodes of the facet are seen at ``arm`` (v, d - 1).
+    Args:
+        ways: (m, d - 1) directions, in the plane that is looked at.
+        arm: (v, d - 1) the nodes of the facet, from the one at the corner.
     """
     length = np.linalg.norm(arm, axis=1)
     seen = length > FLAT * length.max(initial=0.0)

@@ -1,7 +1,4 @@
-"""Make contact conditions of listed nodes.
-
-They are for a user's own matrices, where nothing is known of facets.
-"""
+"""Make contact conditions of listed nodes, for own matrices: nothing is known of facets there."""
 
 from typing import Any
 
@@ -16,7 +13,7 @@ from ...core.obstacles import Obstacle, check_gap, locate_obstacle
 from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem
 from ..matrices.own_matrices import MatrixSpace
-from .frames import Facing, NodalConditions, snapped, surface_of
+from .frames import Facing, NodalConditions, snap_to_axes, surface_of
 from .nodes import Nodes
 
 OWNER = "contact_points"
@@ -32,12 +29,10 @@ def contact_points(
     obstacle: Obstacle | None = None,
     opposite: Any = None,
 ) -> ContactSurface:
-    """Make one contact condition gap0 - u·n >= 0 at each listed node.
+    """Make one contact condition gap0 - u·n >= 0 at each listed node, in this order.
 
-    They are in this order; also node against node.
-
-    All ranks give the same. Nodes at which the normal is oblique get frames of their own, and
-    tangents for friction.
+    With ``opposite`` nodes face nodes. All ranks give the same. Nodes at which the normal is
+    oblique get frames of their own, and tangents for friction.
 
     Args:
         system: of ``system_from_arrays`` or ``fem.system_from_matrices``, whose numbers of nodes
@@ -90,6 +85,8 @@ def contact_points(
         raise InputError(
             f"{OWNER}: the obstacle gives the gaps; leave out gap0 and opposite, or the obstacle"
         )
+
+    # nodes, unit vectors and weights, a row for each condition of all ranks
     numbers = integers(OWNER, "nodes", nodes, (None,))
     m = len(numbers)
     d = space.dimension
@@ -102,7 +99,9 @@ def contact_points(
             f"{OWNER}: the normal of node {numbers[np.argmin(length)]} is zero; give its direction"
         )
     area = _spread("weights", 1.0 if weights is None else weights, (m,), "m²")
-    every = _nodes(space, "nodes", numbers, outward / length[:, None], area)
+    every = _gather_nodes(space, "nodes", numbers, outward / length[:, None], area)
+
+    # directions and gaps: along the normals to what is given, to the obstacle, or to nodes opposite
     directions = every.normals
     faced = None
     gap = _spread("gap0", 0.0 if gap0 is None else gap0, (m,), "metres")
@@ -110,17 +109,17 @@ def contact_points(
         with together(space.comm):  # an obstacle of the user's may fail on one rank
             directions, gap = locate_obstacle(obstacle, every.points, every.normals)
     if opposite is not None:
-        faced = _nodes(
-            space, "opposite", integers(OWNER, "opposite", opposite, (m,)), -every.normals, area
-        )
-        gap = (
-            gap if gap0 is not None else np.sum((faced.points - every.points) * directions, axis=1)
-        )
+        partners = integers(OWNER, "opposite", opposite, (m,))
+        faced = _gather_nodes(space, "opposite", partners, -every.normals, area)
+        if gap0 is None:
+            gap = np.sum((faced.points - every.points) * directions, axis=1)
     with together(space.comm):
         gap = check_gap(gap, every.points, space.size)
+
+    # each rank keeps the conditions of its own nodes
     own = np.flatnonzero(space.blocks_of(numbers) >= 0)
-    pairs = None if faced is None else Facing(faced, sp.identity(m, format="csr")[own])
-    part = NodalConditions(every.pick(own), snapped(directions)[own], own, pairs)
+    facing = None if faced is None else Facing(faced, sp.identity(m, format="csr")[own])
+    part = NodalConditions(every.pick(own), snap_to_axes(directions)[own], own, facing)
     return surface_of(space, [part], gap0=gap[own], weights=area[own])
 
 
@@ -137,10 +136,10 @@ def _spread(meaning: str, value: Any, shape: tuple[int, ...], unit: str = "") ->
     return np.array(np.broadcast_to(array(OWNER, meaning, value, once, unit=unit), shape))
 
 
-def _nodes(
+def _gather_nodes(
     space: MatrixSpace, meaning: str, numbers: Indices, normals: Array, weights: Array
 ) -> Nodes:
-    """Return what all ranks need to know of nodes. Collective.
+    """Return what all ranks need to know of m nodes, on every rank. Collective.
 
     Args:
         space: the unknowns of the matrices.
@@ -148,14 +147,18 @@ def _nodes(
         numbers: (m,) of nodes on any ranks.
         normals: (m, d) outward unit normals.
         weights: (m,) shares of the boundary [m], [m²].
+
+    Raises:
+        InputError: a node that the system does not have.
     """
     d = space.dimension
     own = np.column_stack([np.ones(len(space.nodes)), space.points, space.held, space.numbers])
-    found = space.at_nodes(numbers, own)
-    for number in numbers[found[:, 0] == 0.0]:
+    # one row for each node from the rank that owns it, which a one in the first column tells
+    rows = space.at_nodes(numbers, own)
+    for number in numbers[rows[:, 0] == 0.0]:
         raise InputError(
             f"{OWNER}: {meaning} has node {number}, which the system does not have; give numbers "
             "from 0 on, in the order of its coordinates"
         )
-    points, held, unknowns = np.split(found[:, 1:], [d, 2 * d], axis=1)
+    points, held, unknowns = np.split(rows[:, 1:], [d, 2 * d], axis=1)
     return Nodes(numbers, points, normals, weights, held > 0.0, unknowns.astype(np.int64))

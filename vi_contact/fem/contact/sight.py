@@ -1,10 +1,14 @@
-"""Find what the nodes of side 1 see of side 2 in space.
+"""Find what the nodes of side 1 see of side 2 in space, along their normals.
 
-It is seen along their normals, as polygons of a plane.
+A *look* is a facet of side 1 seen along the normal of one of its nodes, as a polygon of the plane
+at right angles to it; where all nodes have the facet's own normal, as on plane sides, one look
+serves them all. A *piece* is what a look shares with a facet of side 2 that is seen in the same
+way. Where several layers of side 2 lie behind one another, what the nearest one hides is taken
+away.
 
-A facet of side 1 is seen along the normal of each of its nodes; where all nodes have its normal, on
-plane sides, they look at once. What a look shares with the facets in front of it is cut out; of
-several layers the nearest counts.
+``opposite`` does the work: looks are compared with facets in a ball around them (``nearby``), and
+with all facets where something nearer may lie outside (``complete``, ``everything``); then hidden
+parts are cut away (``nearest``). Pairs are compared many at a time, in arrays.
 """
 
 from collections.abc import Iterator
@@ -18,7 +22,7 @@ from ...core.checks import describe_point
 from ...core.errors import InputError
 from ...core.surfaces import make_nodal_frames
 from ...meshes.rows import number_parts
-from .clipping import areas, cross, overlaps, stacked, turns, without
+from .clipping import areas, cross, intersect, stack, subtract, turns
 from .matching import DISTANCES, EDGE_ON, Side
 from .nodes import Nodes, Rows
 
@@ -62,7 +66,8 @@ def facets_of(side: Side, sense: int) -> Facets:
     corners = side.nodes.points[nodes]
     middles = corners.mean(axis=1)
     spokes = corners - middles[:, None, :]
-    # the plane of a facet is at right angles to the direction in which it extends least
+    # the plane of a facet is at right angles to the direction in which it extends least, and its
+    # normal on the side of those of its nodes
     normals = np.linalg.svd(spokes)[2][:, -1]
     inward = np.sum(normals[:, None, :] * side.nodes.normals[nodes], axis=(1, 2)) < 0.0
     normals = np.where(inward[:, None], -normals, normals)
@@ -77,6 +82,8 @@ def facets_of(side: Side, sense: int) -> Facets:
     corners = np.take_along_axis(corners, order[:, :, None], axis=1)
     seen = np.take_along_axis(seen, order[:, :, None], axis=1)
     reach = np.linalg.norm(spokes, axis=2).max(axis=1)
+    # twice the area of the triangle at each corner is small at a sliver, negative where it is not
+    # convex
     for bad in np.flatnonzero((turns(seen) <= SLIVER * reach[:, None] ** 2).any(axis=1)):
         raise InputError(
             f"a facet of '{side.name}' at {describe_point(middles[bad])} is a sliver or not "
@@ -87,15 +94,18 @@ def facets_of(side: Side, sense: int) -> Facets:
 
 @dataclass(frozen=True, eq=False)
 class Looks(Rows):
-    """Hold facets of side 1, each seen along the normals of some of its nodes.
+    """Hold k looks: facets of side 1, each seen along the normal of some of its nodes.
 
     Attributes:
-        nodes, middles, reach: of the facets, as in `Facets`.
-        asking: for which of its nodes (k, v) each is seen.
-        normals: along which they are seen.
-        frames: two unit vectors (k, 3, 2) beside that.
-        slant: its cosine to the facet's own normal, the share of the area that is seen.
-        polygons: the facets as they are seen (k, v, 2), from their middles.
+        nodes: (k, v) nodes of the facet, as in `Facets`.
+        middles: (k, 3) its middle [m].
+        reach: (k,) largest distance of a corner from it [m].
+        normals: (k, 3) unit vectors along which the facet is seen.
+        frames: (k, 3, 2) two unit vectors at right angles to that.
+        polygons: (k, v, 2) the facet as it is seen, from its middle, anticlockwise [m].
+        slant: (k,) cosine of the look to the facet's own normal: the share of its area that is
+            seen.
+        asking: (k, v) for which of its nodes it is seen.
     """
 
     nodes: Indices
@@ -118,6 +128,7 @@ def looks_of(ours: Facets, nodes: Nodes) -> Looks:
         nodes: its nodes, with their normals.
     """
     v = ours.nodes.shape[1]
+    # facets whose nodes have the normal of the facet, to round-off
     normals = nodes.normals[ours.nodes]
     plane = np.linalg.norm(normals - ours.normals[:, None, :], axis=2).max(axis=1) < 1e-12
     # one look for all nodes of a plane facet, then one for each node of every other facet
@@ -126,31 +137,33 @@ def looks_of(ours: Facets, nodes: Nodes) -> Looks:
     each_node = np.tile(np.eye(v), ((~plane).sum(), 1))
     asking = np.concatenate([all_nodes, each_node]) > 0.0
     along = np.concatenate([ours.normals[plane], normals[~plane].reshape(-1, 3)])
+    # the facets as they are seen
     frames = make_nodal_frames(along)[:, :, 1:]
     slant = np.sum(along * ours.normals[facet], axis=1)
     polygons = np.einsum("kvi,kic->kvc", ours.corners[facet] - ours.middles[facet, None, :], frames)
     looks = Looks(
-        ours.nodes[facet],
-        ours.middles[facet],
-        ours.reach[facet],
-        along,
-        frames,
-        polygons,
-        slant,
-        asking,
+        nodes=ours.nodes[facet],
+        middles=ours.middles[facet],
+        reach=ours.reach[facet],
+        normals=along,
+        frames=frames,
+        polygons=polygons,
+        slant=slant,
+        asking=asking,
     )
     return looks.pick(np.flatnonzero((slant > EDGE_ON) & (turns(polygons) > 0.0).all(axis=1)))
 
 
 @dataclass(frozen=True, eq=False)
 class Pieces(Rows):
-    """Hold what looks share with facets of side 2.
+    """Hold k pieces: what looks share with facets of side 2.
 
     Attributes:
-        look, facet: (k,) numbers of both.
-        polygons: (k, m, 2) what they share, in the plane of the look [m].
-        seen: (k, v, 2) the facet as it is seen [m].
-        height: (k, 3) its height along the look, h_0 + h_1 x + h_2 y [m].
+        look: (k,) number of the look.
+        facet: (k,) number of the facet of side 2.
+        polygons: (k, m, 2) what they share, in the plane of the look, from its middle [m].
+        seen: (k, v, 2) the whole facet as it is seen there [m].
+        height: (k, 3) its height along the look at (x, y), h_0 + h_1 x + h_2 y [m].
     """
 
     look: Indices
@@ -160,21 +173,22 @@ class Pieces(Rows):
     height: Array
 
     def distances(self, points: Array) -> Array:
-        """Return how far along their looks points (k, p, 2) are [m]."""
+        """Return how far along their looks (k, p) [m] the facets are at points (k, p, 2)."""
         return np.abs(self.height[:, :1] + np.einsum("kpc,kc->kp", points, self.height[:, 1:]))
 
 
-def joined(parts: list[Pieces]) -> Pieces:
+def join_pieces(parts: list[Pieces]) -> Pieces:
     """Return the pieces of all parts, one part after the other."""
-    fields = {
-        name: np.concatenate([getattr(part, name) for part in parts])
-        for name in Pieces.__dataclass_fields__
-        if name != "polygons"
-    }
-    return Pieces(polygons=stacked([part.polygons for part in parts]), **fields)
+    return Pieces(
+        look=np.concatenate([part.look for part in parts]),
+        facet=np.concatenate([part.facet for part in parts]),
+        polygons=stack([part.polygons for part in parts]),
+        seen=np.concatenate([part.seen for part in parts]),
+        height=np.concatenate([part.height for part in parts]),
+    )
 
 
-def shared(looks: Looks, theirs: Facets, look: Indices, facet: Indices) -> Pieces:
+def cut_shared(looks: Looks, theirs: Facets, look: Indices, facet: Indices) -> Pieces:
     """Return what looks share with facets of side 2, where these face each other.
 
     Args:
@@ -196,13 +210,14 @@ def shared(looks: Looks, theirs: Facets, look: Indices, facet: Indices) -> Piece
     # clip the facet, as it is seen, by the look's own polygon
     frames = looks.frames[look]
     seen = np.einsum("kvi,kic->kvc", theirs.corners[facet] - looks.middles[look, None, :], frames)
-    polygons = overlaps(seen, looks.polygons[look])
+    polygons = intersect(seen, looks.polygons[look])
     # the plane of the facet, n·(x - x_f) = 0, solved for the height along the look
     normals = theirs.normals[facet]
     height = np.column_stack(
         [np.sum(offset * normals, axis=1), -np.einsum("kic,ki->kc", frames, normals)]
     )
     pieces = Pieces(look, facet, polygons, seen, height / slope[:, None])
+    # without what is round-off, and facets that are seen folded
     large = areas(polygons) > SHARED * areas(looks.polygons)[look]
     return pieces.pick(np.flatnonzero(large & (turns(seen) > 0.0).all(axis=1)))
 
@@ -220,11 +235,11 @@ def opposite(looks: Looks, theirs: Facets, tree: Any) -> tuple[Pieces, Array]:
     """
     count = len(looks.nodes)
     size = areas(looks.polygons)
-    # facets near by first; all of side 2 only where something nearer may be farther to the side
+    # facets in a ball first; all of side 2 only where something nearer may be outside of it
     pieces, radius = nearby(looks, theirs, tree)
     sure = complete(pieces, looks, theirs, radius)
     rest = everything(looks, np.flatnonzero(~sure), theirs)
-    pieces = joined([pieces.pick(np.flatnonzero(sure[pieces.look])), *rest])
+    pieces = join_pieces([pieces.pick(np.flatnonzero(sure[pieces.look])), *rest])
     # where several layers lie behind one another, only the nearest counts
     twice = np.bincount(pieces.look, areas(pieces.polygons), count) > (1.0 + WHOLE) * size
     pieces = nearest(pieces, twice | (layers(pieces, theirs, count) > 1), size)
@@ -234,8 +249,9 @@ def opposite(looks: Looks, theirs: Facets, tree: Any) -> tuple[Pieces, Array]:
 def nearby(looks: Looks, theirs: Facets, tree: Any) -> tuple[Pieces, Array]:
     """Return what looks share with facets of side 2 in a ball around each, and the radii [m].
 
-    The balls are large enough for the facets next to the one with the nearest middle; where one
-    holds too many nothing is looked at.
+    A ball is large enough for the facets next to the one with the nearest middle. Where one holds
+    too many facets (``NEARBY``) nothing is looked at there, and ``complete`` finds the look
+    uncovered.
 
     Args:
         looks: those of side 1.
@@ -247,24 +263,24 @@ def nearby(looks: Looks, theirs: Facets, tree: Any) -> tuple[Pieces, Array]:
     few = tree.query_ball_point(looks.middles, radius, return_length=True) <= NEARBY
     near = tree.query_ball_point(looks.middles, np.where(few, radius, 0.0))
     look = np.repeat(np.arange(len(radius)), [len(facets) for facets in near])
-    return shared(looks, theirs, look, np.concatenate(near).astype(np.int64)), radius
+    return cut_shared(looks, theirs, look, np.concatenate(near).astype(np.int64)), radius
 
 
 def complete(pieces: Pieces, looks: Looks, theirs: Facets, radius: Array) -> Mask:
-    """Return whether nothing nearer to a look than its pieces can lie outside of its ball.
+    """Return for which looks nothing nearer than their pieces can lie outside of their balls.
 
     Where one layer, at most h away along the normal, covers all of a look, a nearer facet has its
     middle at most h along the normal and reach_1 + reach_2 beside it: within sqrt(h² + (reach_1 +
     reach_2)²) of the look's middle.
 
     Args:
-        pieces: what was found in the balls.
+        pieces: what looks share with facets in the balls.
         looks: those of side 1.
         theirs: the facets of side 2.
         radius: (looks,) of the balls [m].
 
     Returns:
-        (looks,) truth values.
+        (looks,) mask.
     """
     covered = np.bincount(pieces.look, areas(pieces.polygons), len(radius))
     farthest = np.zeros(len(radius))
@@ -277,7 +293,7 @@ def complete(pieces: Pieces, looks: Looks, theirs: Facets, radius: Array) -> Mas
 def everything(looks: Looks, rows: Indices, theirs: Facets) -> Iterator[Pieces]:
     """Yield what these rows of looks share with any facet of side 2.
 
-    Rows whose normal misses a ball around all of it are left out.
+    Rows whose normal misses a ball around all of side 2 are left out.
 
     Args:
         looks: those of side 1.
@@ -297,7 +313,7 @@ def everything(looks: Looks, rows: Indices, theirs: Facets) -> Iterator[Pieces]:
     for some in np.array_split(rows, -(-len(rows) * len(theirs.nodes) // DISTANCES)):
         away = beside(looks, some[:, None], theirs.middles)
         look, facet = np.nonzero(away <= (1.0 + WHOLE) * (looks.reach[some, None] + theirs.reach))
-        yield shared(looks, theirs, some[look], facet)
+        yield cut_shared(looks, theirs, some[look], facet)
 
 
 def beside(looks: Looks, rows: Indices, points: Array) -> Array:
@@ -314,9 +330,9 @@ def beside(looks: Looks, rows: Indices, points: Array) -> Array:
 
 
 def layers(pieces: Pieces, theirs: Facets, count: int) -> Indices:
-    """Return how many parts without a common node the pieces in front of each look are of.
+    """Return how many parts of side 2 without a common node lie in front of each look.
 
-    One may hide another.
+    With more than one, one may hide another.
 
     Args:
         pieces: what looks share with facets.
@@ -335,7 +351,7 @@ def layers(pieces: Pieces, theirs: Facets, count: int) -> Indices:
 
 
 def nearest(pieces: Pieces, several: Mask, size: Array) -> Pieces:
-    """Return the pieces, in front of looks with several layers without what lies behind others.
+    """Return the pieces without what others in front of the same look hide.
 
     Args:
         pieces: what looks share with facets.
@@ -351,17 +367,17 @@ def nearest(pieces: Pieces, several: Mask, size: Array) -> Pieces:
     piece, other = pairs_of(ours.look)
     hides = np.zeros(len(piece), dtype=bool)
     for rows in np.array_split(np.arange(len(piece)), 1 + len(piece) // PAIRS):
-        one = ours.pick(piece[rows])
-        two = ours.pick(other[rows])
-        common = overlaps(one.polygons, two.polygons)
+        front = ours.pick(other[rows])
+        back = ours.pick(piece[rows])
+        common = intersect(back.polygons, front.polygons)
         middles = common.mean(axis=1, keepdims=True)
-        behind = two.distances(middles) < one.distances(middles)
+        behind = front.distances(middles) < back.distances(middles)
         hides[rows] = (areas(common) > least[piece[rows]]) & behind[:, 0]
     piece = piece[hides]
     other = other[hides]
 
-    # cut out of each piece what hides it, one hider of every piece at a time; what is left may be
-    # several polygons, each with the number of its piece
+    # cut out of each piece what hides it, one hider of every piece at a time; what is left of a
+    # piece may be several polygons: ``left``, with the numbers of their pieces in ``owner``
     turn = np.arange(len(piece)) - np.searchsorted(piece, piece)
     owner = np.arange(len(ours.look))
     left = ours.polygons
@@ -369,19 +385,27 @@ def nearest(pieces: Pieces, several: Mask, size: Array) -> Pieces:
         hider = np.full(len(ours.look), -1)
         hider[piece[turn == k]] = other[turn == k]
         hidden = hider[owner] >= 0
-        now = owner[hidden]
-        place, rest = without(left[hidden], ours.polygons[hider[now]], least[now])
-        owner = np.concatenate([owner[~hidden], now[place]])
-        left = stacked([left[~hidden], rest])
-    return joined([pieces.pick(np.flatnonzero(~among)), replace(ours.pick(owner), polygons=left)])
+        cut_piece = owner[hidden]
+        place, rest = subtract(left[hidden], ours.polygons[hider[cut_piece]], least[cut_piece])
+        owner = np.concatenate([owner[~hidden], cut_piece[place]])
+        left = stack([left[~hidden], rest])
+    return join_pieces(
+        [pieces.pick(np.flatnonzero(~among)), replace(ours.pick(owner), polygons=left)]
+    )
 
 
 def pairs_of(groups: Indices) -> tuple[Indices, Indices]:
-    """Return all pairs of different places with the same number in ``groups``, which ascend."""
+    """Return all pairs (p,), (p,) of different places with the same number in ``groups``.
+
+    Args:
+        groups: (n,) numbers, ascending; a pair is given both ways.
+    """
     _, first, counts = np.unique(groups, return_index=True, return_counts=True)
     # each member of a group of n is followed by n others, that count up from the group's first
     start = np.repeat(first, counts)
     count = np.repeat(counts, counts)
-    one = np.repeat(np.arange(len(groups)), count)
-    two = np.arange(len(one)) - np.repeat(np.cumsum(count) - count, count) + np.repeat(start, count)
-    return one[one != two], two[one != two]
+    place = np.repeat(np.arange(len(groups)), count)
+    # how many pairs of this place came before, added to the first of its group
+    before = np.arange(len(place)) - np.repeat(np.cumsum(count) - count, count)
+    other = before + np.repeat(start, count)
+    return place[place != other], other[place != other]

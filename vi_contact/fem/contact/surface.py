@@ -1,6 +1,15 @@
-"""Make contact conditions of facets of a mesh.
+"""Make contact conditions of facets of a mesh, in front of a rigid obstacle.
 
-They have nodal normals, weights, gaps and the rotated basis.
+The steps of ``contact_surface``, each on the nodes that this rank owns:
+
+    nodes_on, free_nodes, find_listed    nodes of the facets, their normals and weights
+    faces.split_at_corners               one row for each face of a node
+    _make_question                       the obstacle says directions and gaps
+    one_per_direction                    faces with one direction are one condition again
+    merge_ties                           so are nodes that move as one
+    frames.surface_of                    frames of the nodes, and the rotated basis
+
+``pairs`` takes some of these steps for two deformable bodies.
 """
 
 import logging
@@ -23,15 +32,29 @@ from ...core.timing import report_time
 from ..body.space import FemSpace, space_of
 from ..mesh.group_checks import facets_of
 from ..mesh.tagged_mesh import Facets
-from .borrowing import borrowed
-from .bubbles import averaged
+from .borrowing import borrow
+from .bubbles import average_bubbles
 from .counting import census_on_ranks, tell
-from .faces import boundary, checked_angle, in_symmetry_planes, integrals, split, tell_corners
-from .frames import Facing, NodalConditions, NodalFrames, given, snapped, surface_of
-from .hinges import gathered_points, hinges_of, refuse_hinges
+from .faces import (
+    check_angle,
+    gather_boundary,
+    in_symmetry_planes,
+    integrate_nodal,
+    split_at_corners,
+    tell_corners,
+)
+from .frames import (
+    Facing,
+    NodalConditions,
+    NodalFrames,
+    gather_frame_data,
+    snap_to_axes,
+    surface_of,
+)
+from .hinges import gather_points, mark_hinges, refuse_hinges
 from .matching import EDGE_ON
-from .nodes import Nodes, asked, everywhere, gather_rows, joined_nodes, slots_of
-from .watching import Watched, clamped_or_prescribed, watched_nodes
+from .nodes import Nodes, ask_alike, everywhere, gather_rows, join_nodes, slots_of
+from .watching import Watched, sort_held, watch_nodes
 
 log = logging.getLogger(__name__)
 
@@ -94,30 +117,31 @@ def contact_surface(
         ("directions", "gap"),
         "give HalfSpace(…) or another",
     )
-    angle = checked_angle("contact_surface", feature_angle)
+    angle = check_angle("contact_surface", feature_angle)
     flag("contact_surface", "hinges", hinges)
     comm = space.comm
 
     # this rank's nodes of the facets, and those of them that are asked for: listed, or not clamped
     every = nodes_on(space, facets)
-    hinge = hinges_of(space, every)
+    hinge = mark_hinges(space, every)
     if not hinges:
-        refuse_hinges("contact_surface", (facets.name,), gathered_points(comm, every, hinge))
+        refuse_hinges("contact_surface", (facets.name,), gather_points(comm, every, hinge))
     if points is None:
         chosen = None
         whole = free_nodes(space, every, facets.name)
     else:
-        chosen = listed(space, everywhere(comm, every), points, facets.name)
+        chosen = find_listed(space, everywhere(comm, every), points, facets.name)
         whole = every.pick(_rows_of(every, chosen))
 
     # one node for each face, the obstacle's answer there, and one condition for each direction
-    around = boundary(space, facets, beyond=angle)
-    nodes, _ = split(space, around, whole, angle)
+    around = gather_boundary(space, facets, beyond=angle)
+    nodes, _ = split_at_corners(space, around, whole, angle)
     slots = slots_of(comm, _places(nodes, chosen))
-    ask = _obstacle(obstacle, space.size, facets.name, angle, round(total(comm, len(slots))))
-    directions, gap = asked(comm, slots, ask, nodes.points, nodes.normals)
+    count = round(total(comm, len(slots)))
+    ask = _make_question(obstacle, space.size, facets.name, angle, count)
+    directions, gap = ask_alike(comm, slots, ask, nodes.points, nodes.normals)
     nodes, directions, gap = one_per_direction(whole, nodes, directions, gap)
-    nodes, directions, gap = with_ties(space, facets.name, nodes, directions, gap, angle)
+    nodes, directions, gap = merge_ties(space, facets.name, nodes, directions, gap, angle)
 
     # conditions in the order of their nodes, or of the list
     order = np.argsort(_places(nodes, chosen), kind="stable")
@@ -127,102 +151,128 @@ def contact_surface(
     slots = slots_of(comm, _places(nodes, chosen))
     weights = nodes.weights * space.forms.section.thickness
     tell_corners(space, facets.name, nodes, slots, angle)
-    beside = borrowed(
-        space, facets, every.numbers if chosen is None else every.numbers[:0], nodes.numbers
-    )
+    # nodes of the boundary without a condition borrow a pressure, unless points are listed
+    without = every.numbers if chosen is None else every.numbers[:0]
+    beside = borrow(space, facets, without, nodes.numbers)
     conditions = NodalConditions(
-        nodes, directions, slots, bubbles=averaged(space, facets, nodes), borrowed=beside
+        nodes, directions, slots, bubbles=average_bubbles(space, facets, nodes), borrowed=beside
     )
 
     # what became of the nodes without a condition
     held = every.held.all(axis=1)
-    kept = np.isin(every.numbers, whole.numbers)
-    kinds = dict(clamped_or_prescribed(space, every, held))
+    wanted = np.isin(every.numbers, whole.numbers)
+    kinds = dict(sort_held(space, every, held))
     kinds |= {
-        "not listed": ~(held | kept),
-        "tied to another": kept & ~np.isin(every.numbers, nodes.numbers),
+        "not listed": ~(held | wanted),
+        "tied to another": wanted & ~np.isin(every.numbers, nodes.numbers),
     }
     watched: tuple[Watched, ...] = ()
     if chosen is None:
-        lost, _ = split(space, around, every.pick(held), angle)
-        watched = _watched(space, facets.name, lost, obstacle)
+        lost, _ = split_at_corners(space, around, every.pick(held), angle)
+        watched = _watch_held(space, facets.name, lost, obstacle)
     kinds["shared with another body"] = hinge
     census = census_on_ranks(comm, facets.name, every, kinds, len(slots))
     tell(comm, census)
     surface = surface_of(
         space, [conditions], gap0=gap, weights=weights, censuses=(census,), watched=watched
     )
-    return replace(surface, **prescribed_motion(space, conditions))
+    return replace(surface, **make_prescribed_motion(space, conditions))
 
 
-def prescribed_motion(space: FemSpace, conditions: NodalConditions) -> dict[str, Any]:
-    """Return ``motion`` and ``slide`` of this rank's conditions. Collective.
+def make_prescribed_motion(space: FemSpace, conditions: NodalConditions) -> dict[str, Any]:
+    """Return ``motion`` and ``slide`` of conditions that face prescribed nodes. Collective.
 
-    There are some where what they face, or bubbles are measured from, is moved.
+    Such nodes move like an obstacle. Bubbles of edges count as well: a prescribed vertex moves the
+    mid-points that they are measured from.
+
+    Args:
+        space: the body's unknowns.
+        conditions: this rank's.
+
+    Returns:
+        functions of t [s], (m,) and (m, d - 1) [m], by the names of a ``ContactSurface``; nothing
+        where what conditions face is not moved.
     """
-    parts = _faced_by(conditions)
-    moves = bool(parts) and space.moves
-    held = any(part.nodes.held[part.P.indices].any() for part in parts)
+    faced = _list_faced(conditions)
+    moves = bool(faced) and space.moves
+    held = any(part.nodes.held[part.P.indices].any() for part in faced)
     if not moves or not (space.hierarchy or largest(space.comm, held)):
         return {}
-    moved = moved_by_held(space, [conditions])
-    values = space.prescribed_values
-    return {"motion": lambda t: moved(values(t))[0], "slide": lambda t: moved(values(t))[1]}
+    move = make_obstacle_motion(space, [conditions])
+
+    def motion(t: float) -> Array:
+        towards, _ = move(space.evaluate_prescribed(t))
+        return towards
+
+    def slide(t: float) -> Array:
+        _, along = move(space.evaluate_prescribed(t))
+        return along
+
+    return {"motion": motion, "slide": slide}
 
 
-def moved_by_held(
+def make_obstacle_motion(
     space: FemSpace, conditions: Sequence[NodalConditions]
 ) -> Callable[[Array], tuple[Array, Array]]:
-    """Return a function that tells how far held components move obstacles.
+    """Return a function that tells how far prescribed nodes move as obstacles. Collective.
 
-    Given nodal displacements (k, d) of held components, it tells how far the obstacles of these
-    conditions move towards their nodes, (m,), and along their tangents, (m, d-1). Both are
-    collective.
+    What a condition faces moves by x = sum_j P_sj U_j; towards the node that is -n·x, and along
+    each of its tangents t·x.
+
+    Args:
+        space: the bodies' unknowns.
+        conditions: this rank's m conditions, one part after the other.
+
+    Returns:
+        U (owned nodes, d), zero at free components -> (m,) and (m, d - 1) [m]; collective too.
     """
-    # which tangents of each condition are free, and its vectors
-    frames = NodalFrames(*given(conditions))
-    free = ~joined_nodes([one.nodes for one in conditions]).held
-    free = (
-        np.take_along_axis(free, list_tangential_columns(frames.column, space.dimension), axis=1)
-        & frames.rubs
-    )
+    # tangents of each condition that are free, and its vectors
+    frames = NodalFrames(*gather_frame_data(conditions))
+    free = ~join_nodes([part.nodes for part in conditions]).held
+    columns = list_tangential_columns(frames.column, space.dimension)
+    free = np.take_along_axis(free, columns, axis=1) & frames.rubs
     tangents = make_tangent_vectors(frames.directions, frames.place)
     directions = frames.directions
-    # what conditions face, and shares of it
-    faced = [_faced_by(part) for part in conditions]
-    own = [np.zeros(0, dtype=np.int64), *(part.nodes.numbers for parts in faced for part in parts)]
+    # the nodes that conditions of any rank face, each once
+    faced = [_list_faced(part) for part in conditions]
+    own = [np.zeros(0, dtype=np.int64)]
+    for others in faced:
+        own += [other.nodes.numbers for other in others]
     numbers = np.unique(np.concatenate(from_each(space.comm, np.concatenate(own))))
-    places = [[np.searchsorted(numbers, part.nodes.numbers) for part in parts] for parts in faced]
+    places = []
+    for others in faced:
+        places.append([np.searchsorted(numbers, other.nodes.numbers) for other in others])
 
-    def moved(nodal: Array) -> tuple[Array, Array]:
+    def move(nodal: Array) -> tuple[Array, Array]:
         nodal = nodal.reshape(-1, space.dimension)
         if space.hierarchy is not None:
-            nodal = space.hierarchy.bent(nodal)
+            nodal = space.hierarchy.split_bubbles(nodal)
         values = space.at_nodes(numbers, nodal)
         motions = []
-        for part, others, where in zip(conditions, faced, places, strict=True):
+        for part, others, rows in zip(conditions, faced, places, strict=True):
             motion = np.zeros_like(part.directions)
-            for other, place in zip(others, where, strict=True):
+            for other, place in zip(others, rows, strict=True):
                 motion = motion + other.P @ values[place]
             motions.append(motion)
-        there = np.concatenate(motions)
-        return -np.sum(there * directions, axis=1), np.einsum("ijk,ij->ik", tangents, there) * free
+        x = np.concatenate(motions)
+        return -np.sum(x * directions, axis=1), np.einsum("ijk,ij->ik", tangents, x) * free
 
-    return moved
+    return move
 
 
-def _faced_by(part: NodalConditions) -> list[Facing]:
-    """Return what conditions face, and bubbles that they are measured from."""
+def _list_faced(part: NodalConditions) -> list[Facing]:
+    """Return all that displacements of conditions are relative to: what they face, and bubbles."""
     return [other for other in (part.facing, *part.bubbles) if other is not None]
 
 
-def _obstacle(
+def _make_question(
     obstacle: Obstacle | None, size: float, name: str, angle: float, count: int
 ) -> Callable[[Array, Array], tuple[Array, Array]]:
-    """Return what an obstacle answers at points with these normals.
+    """Return a function that asks an obstacle: points, normals (k, d) -> directions, gaps (k,) [m].
 
-    This is directions and initial gaps, of all ``count`` points of a boundary or of those of a
-    rank.
+    It is called with the points of a rank or with all points of a boundary. Only where it has all
+    of them, which their number tells, the far side of a round body can be let be
+    (``locate_obstacle``).
 
     Args:
         obstacle: what the boundary faces; Touching() when None.
@@ -239,39 +289,45 @@ def _obstacle(
         directions, gap = locate_obstacle(
             way, points, normals, name=name, angle=angle, alone=len(points) == count
         )
-        return snapped(directions), check_gap(gap, points, size)
+        return snap_to_axes(directions), check_gap(gap, points, size)
 
     return ask
 
 
-def _watched(
+def _watch_held(
     space: FemSpace, name: str, nodes: Nodes, obstacle: Obstacle | None
 ) -> tuple[Watched, ...]:
     """Return what watches nodes that are prescribed in every component. Collective.
 
-    They are nodes of this rank, watched at each of their faces that looks towards the obstacle.
-    There is an InputError where such a face is in the obstacle at the start.
+    Each is watched at those of its faces that look towards the obstacle.
 
     Args:
         space: the body's unknowns.
         name: that of the boundary.
-        nodes: those of this rank that are held.
+        nodes: those of this rank that are held, a row for each face.
         obstacle: what the boundary faces.
+
+    Raises:
+        InputError: on all ranks, a face that is in the obstacle at the start.
     """
     slots = slots_of(space.comm, nodes.numbers)
-    directions, gap = asked(
-        space.comm, slots, _looking(obstacle, space.size), nodes.points, nodes.normals
-    )
+    ask = _make_look(obstacle, space.size)
+    directions, gap = ask_alike(space.comm, slots, ask, nodes.points, nodes.normals)
     rows = np.flatnonzero(directions.any(axis=1))
-    return watched_nodes(space, name, nodes.pick(rows), directions[rows], gap[rows])
+    return watch_nodes(space, name, nodes.pick(rows), directions[rows], gap[rows])
 
 
-def _looking(
+def _make_look(
     obstacle: Obstacle | None, size: float
 ) -> Callable[[Array, Array], tuple[Array, Array]]:
-    """Return what an obstacle answers at points with these normals.
+    """Return a function that asks an obstacle, as ``_make_question`` does, about held nodes.
 
-    Directions are zero where they do not lead out of the body or the obstacle has no answer.
+    Directions are zero where they do not lead out of the body, or where the obstacle refuses to
+    answer: at such nodes there is nothing to watch.
+
+    Args:
+        obstacle: what the boundary faces; Touching() when None.
+        size: that of the mesh [m].
     """
 
     def ask(points: Array, normals: Array) -> tuple[Array, Array]:
@@ -287,7 +343,7 @@ def _looking(
             return directions, gap
         cosine = np.sum(ways * normals, axis=1)
         rows = np.flatnonzero(cosine > EDGE_ON * np.linalg.norm(ways, axis=1))
-        directions[rows] = snapped(ways[rows])
+        directions[rows] = snap_to_axes(ways[rows])
         gap[rows] = check_gap(gaps[rows], points[rows], size)
         return directions, gap
 
@@ -301,9 +357,14 @@ def _rows_of(nodes: Nodes, chosen: Indices) -> Indices:
 
 
 def _places(nodes: Nodes, chosen: Indices | None) -> Indices:
-    """Return what orders the conditions of all ranks.
+    """Return what orders the conditions of all ranks: numbers of nodes, or places in a list.
 
-    This is the numbers of their nodes, or their places in a list of nodes.
+    Args:
+        nodes: k nodes.
+        chosen: numbers of listed nodes, in the order of the list; None without a list.
+
+    Returns:
+        (k,) keys.
     """
     if chosen is None:
         return nodes.numbers
@@ -314,13 +375,14 @@ def _places(nodes: Nodes, chosen: Indices | None) -> Indices:
 def one_per_direction(
     whole: Nodes, nodes: Nodes, directions: Array, gap: Array
 ) -> tuple[Nodes, Array, Array]:
-    """Return (nodes, directions, gaps).
+    """Return nodes, directions and gaps of conditions, one for each direction of a node.
 
-    Faces of one direction at a node are one condition: weights added, smaller gap.
+    Faces of a node with one direction are one condition, with the sum of their weights and the
+    smaller gap.
 
     Args:
         whole: the nodes, with the weights of all their faces.
-        nodes: one for each face of a node, those of one node in a row.
+        nodes: k rows, one for each face of a node, those of one node in a row.
         directions: (k, d) contact directions of these.
         gap: (k,) their gaps [m].
     """
@@ -328,32 +390,35 @@ def one_per_direction(
         return nodes, directions, gap
     weights = nodes.weights.copy()
     gap = gap.copy()
-    kept = np.ones(len(nodes.numbers), dtype=bool)
-    numbers, starts, counts = np.unique(nodes.numbers, return_index=True, return_counts=True)
-    entire = dict(zip(whole.numbers.tolist(), whole.weights, strict=True))
-    for node, start, count in zip(
-        *(column[counts > 1].tolist() for column in (numbers, starts, counts)), strict=True
-    ):
-        before: list[int] = []  # the rows of a node follow one another
+    stays = np.ones(len(nodes.numbers), dtype=bool)
+    _, starts, counts = np.unique(nodes.numbers, return_index=True, return_counts=True)
+    whole_weight = dict(zip(whole.numbers.tolist(), whole.weights, strict=True))
+    several = counts > 1
+    for start, count in zip(starts[several].tolist(), counts[several].tolist(), strict=True):
+        # each row of the node joins the first row before it that has its direction, if any
+        conditions: list[int] = []
         for row in range(start, start + count):
             alike = [
-                other for other in before if directions[row] @ directions[other] > 1.0 - PARALLEL
+                other
+                for other in conditions
+                if directions[row] @ directions[other] > 1.0 - PARALLEL
             ]
             if alike:
                 weights[alike[0]] += weights[row]
                 gap[alike[0]] = min(gap[alike[0]], gap[row])
-                kept[row] = False
+                stays[row] = False
             else:
-                before.append(row)
-        if len(before) == 1:
-            weights[start] = entire[node]  # to the last digit
-    return replace(nodes, weights=weights).pick(kept), directions[kept], gap[kept]
+                conditions.append(row)
+        # where all faces are one condition its weight is that of the node to the last digit
+        if len(conditions) == 1:
+            weights[start] = whole_weight[int(nodes.numbers[start])]
+    return replace(nodes, weights=weights).pick(stays), directions[stays], gap[stays]
 
 
 def contact_space(
     owner: str, system: SemiDiscreteSystem, groups: Mapping[str, Facets], points: Any, **others: Any
 ) -> FemSpace:
-    """Return the space of a system. Collective.
+    """Check what ``contact_surface`` and ``contact_pair`` both take; return the space. Collective.
 
     Args:
         owner: who asks.
@@ -370,17 +435,22 @@ def contact_space(
     agree(space.comm, owner, {**groups, "points": points, **others})
     for meaning, group in groups.items():
         facets_of(owner, meaning, group, space.mesh)
-    for point in (
-        () if points is None else several(owner, "points", points, "give a list of points, or None")
-    ):
-        several(owner, "a point", point, f"give {space.dimension} coordinates")
-        array(owner, "a point", point, (None,))
+    if points is not None:
+        for point in several(owner, "points", points, "give a list of points, or None"):
+            several(owner, "a point", point, f"give {space.dimension} coordinates")
+            array(owner, "a point", point, (None,))
     return space
 
 
 def nodes_on(space: FemSpace, facets: Facets) -> Nodes:
-    """Return this rank's nodes of the facets, ordered by original node number. Collective."""
-    values = integrals(space, facets.indices)
+    """Return this rank's nodes of the facets, ordered by their numbers. Collective.
+
+    Their weights are ∫ phi_i, their normals have the direction of ∫ phi_i n over the facets.
+
+    Raises:
+        InputError: on all ranks, facets without nodes, and facets inside of the body.
+    """
+    values = integrate_nodal(space, facets.indices)
     blocks = space.facet_blocks(facets.indices)
     if space.hierarchy is not None:
         blocks = np.intersect1d(blocks, space.hierarchy.vertices[1])
@@ -397,6 +467,7 @@ def nodes_on(space: FemSpace, facets: Facets) -> Nodes:
             f"boundary group '{facets.name}' lies inside the body, where cells on both sides share "
             "its nodes: cut the mesh open there (meshes.cut.CutOpen), or choose an outer boundary"
         )
+    # of facets that close round a node the sum is zero, and so is its normal here
     length = np.linalg.norm(sums, axis=1)[:, None]
     normals = in_symmetry_planes(sums / np.maximum(length, np.finfo(float).tiny), held)
     return Nodes(
@@ -405,12 +476,15 @@ def nodes_on(space: FemSpace, facets: Facets) -> Nodes:
 
 
 def free_nodes(space: FemSpace, nodes: Nodes, name: str) -> Nodes:
-    """Return the nodes that are not clamped; InputError when none is left on any rank.
+    """Return the nodes that are not held in every component. Collective.
 
     Args:
         space: the body's unknowns.
         nodes: those of this rank.
         name: that of the boundary.
+
+    Raises:
+        InputError: none is left on any rank.
     """
     clamped = nodes.held.all(axis=1)
     count = round(total(space.comm, clamped.sum()))
@@ -424,16 +498,19 @@ def free_nodes(space: FemSpace, nodes: Nodes, name: str) -> Nodes:
     return nodes.pick(~clamped)
 
 
-def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], name: str) -> Indices:
-    """Return the numbers of those nodes that are nearest to the listed points.
-
-    The nodes are given of all ranks; the numbers are in the order of the points.
+def find_listed(
+    space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], name: str
+) -> Indices:
+    """Return the numbers (k,) of the nodes nearest to listed points, in the order of the list.
 
     Args:
         space: the body's unknowns.
         nodes: those of all ranks.
         points: (k, d) coordinates [m].
         name: that of the boundary.
+
+    Raises:
+        InputError: an empty list, a point that is not on the boundary, clamped, or listed twice.
     """
     rows = []
     for point in points:
@@ -470,23 +547,25 @@ def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], nam
     return np.asarray(nodes.numbers[rows])
 
 
-def merged(
+def merge_tied(
     space: FemSpace, name: str, nodes: Nodes, directions: Array, angle: float
 ) -> tuple[Nodes, Array, Any]:
-    """Return (nodes, directions, shares (k, m)) of the k conditions that are left.
+    """Merge the conditions of nodes that move as one (tied boundaries), one for each face.
 
-    They are left of the m of all ranks when nodes that move as one (tied boundaries) have one for
-    each face: sums of weights, means with shares by weight.
-
-    InputError for a node that is tied in some components only, or to one without such a
-    condition.
+    A merged condition has the sum of their weights, and means of all else by weight.
 
     Args:
         space: the body's unknowns.
         name: that of the boundary.
-        nodes: those of all m conditions.
+        nodes: those of the m conditions of all ranks.
         directions: (m, d) contact directions.
-        angle: the feature angle [rad].
+        angle: the feature angle [rad]: conditions whose directions turn by less are of one face.
+
+    Returns:
+        nodes and directions of the k conditions that are left, and their shares (k, m) in the m.
+
+    Raises:
+        InputError: a node that is tied in some components only, or to one without such a condition.
     """
     leaders = space.leaders(nodes.numbers)
     # the row of a leader with the direction nearest to that of each node which follows it
@@ -495,37 +574,31 @@ def merged(
         alike = np.flatnonzero(nodes.numbers == leaders[row])
         turn = directions[alike] @ directions[row]
         if turn.max(initial=-2.0) < np.cos(angle):
-            partly = leaders[row] < 0
-            how = (
-                "is tied in some components only"
-                if partly
-                else "is tied to a node outside this contact"
-            )
-            remedy = (
-                "tie all components" if partly else "add the boundary of that node to the group"
-            )
+            if leaders[row] < 0:
+                how = "is tied in some components only"
+                remedy = "tie all components"
+            else:
+                how = "is tied to a node outside this contact"
+                remedy = "add the boundary of that node to the group"
             raise InputError(
                 f"contact node {describe_point(nodes.points[row])} of '{name}' {how}: leave it "
                 f"out, by listing the others as points=, or {remedy}"
             )
         target[row] = alike[turn.argmax()]
     # one condition for all that have one target: shares are their weights over the sum of these
-    kept, place = np.unique(target, return_inverse=True)
+    targets, place = np.unique(target, return_inverse=True)
     sums = sp.csr_matrix((nodes.weights, (place.ravel(), np.arange(len(target)))))
     weights = np.asarray(sums.sum(axis=1)).ravel()
     shares = sp.csr_matrix(sp.diags([1.0 / weights], [0]) @ sums)
-    directions = np.where(
-        (np.diff(shares.indptr) > 1)[:, None], snapped(shares @ directions), directions[kept]
-    )
-    return replace(nodes.pick(kept), weights=weights), directions, shares
+    merged = np.diff(shares.indptr) > 1
+    directions = np.where(merged[:, None], snap_to_axes(shares @ directions), directions[targets])
+    return replace(nodes.pick(targets), weights=weights), directions, shares
 
 
-def with_ties(
+def merge_ties(
     space: FemSpace, name: str, nodes: Nodes, directions: Array, gap: Array, angle: float
 ) -> Any:
-    """Return (nodes, directions, gaps) of this rank, those of nodes that move as one ``merged``.
-
-    Collective.
+    """Return nodes, directions and gaps of this rank's conditions, tied ones merged. Collective.
 
     Args:
         space: the body's unknowns.
@@ -536,13 +609,13 @@ def with_ties(
         angle: the feature angle [rad].
     """
     tied = np.isin(nodes.numbers, space.tied_nodes)
-    every = joined_nodes(from_each(space.comm, nodes.pick(tied)))
+    every = join_nodes(from_each(space.comm, nodes.pick(tied)))
     ways, gaps = gather_rows(space.comm, directions[tied], gap[tied])
     if not len(gaps):
         return nodes, directions, gap
     # merge those of all ranks, and keep what this rank owns of them
-    every, ways, shares = merged(space, name, every, ways, angle)
+    every, ways, shares = merge_tied(space, name, every, ways, angle)
     own = np.flatnonzero(space.blocks_of(every.numbers) >= 0)
-    nodes = joined_nodes([nodes.pick(~tied), every.pick(own)])
+    nodes = join_nodes([nodes.pick(~tied), every.pick(own)])
     directions = np.concatenate([directions[~tied], ways[own]])
     return nodes, directions, np.concatenate([gap[~tied], (shares @ gaps)[own]])

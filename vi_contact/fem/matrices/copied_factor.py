@@ -1,6 +1,8 @@
-"""Factorise PETSc matrices with contact unknowns last.
+"""Factorise PETSc matrices by CHOLMOD, contact unknowns last, with a whole copy on every rank.
 
-This is done by CHOLMOD, with a whole copy of the factor on every rank.
+``kernels.contact_last`` holds the factor, and says why contact unknowns come last. On several ranks
+each gathers the whole matrix and right-hand side, solves by itself, and keeps its own rows of the
+answer, so that no result depends on the order of messages.
 """
 
 from collections.abc import Callable
@@ -16,65 +18,75 @@ from .petsc_rows import rows_of
 
 
 def contact_last(comm: Any, mat: Any, last: Indices) -> ContactLast | None:
-    """Return the factor of an AIJ matrix on an MpiComm. Collective.
+    """Return the factor of a symmetric matrix, or None where CHOLMOD makes none. Collective.
 
-    It is None without CHOLMOD, and where it cannot: not positive definite, which PETSc says better,
-    or too large.
+    It makes none where it is missing, where the matrix is not positive definite, which PETSc says
+    better, and where the factor is too large.
 
     Args:
-        comm: the ranks.
-        mat: the PETSc matrix.
-        last: owned unknowns that come last.
+        comm: the ranks, an MpiComm.
+        mat: the PETSc matrix, AIJ.
+        last: owned unknowns that are eliminated last, counted from 0 on this rank.
     """
     functions = load_cholmod(comm)
     if functions is None:
         return None
     rows = rows_of(mat)
-    made = None
+    factor = None
     try:
         if comm.size == 1:
-            made = ContactLast(functions, rows, last)
+            factor = ContactLast(functions, rows, last)
         else:
             whole = sp.vstack(comm.mpi.allgather(rows), format="csr")
-            first = mat.getOwnershipRange()
-            made = ContactLast(
-                functions, whole, last, whole=_gathering(comm.mpi, mat), mine=slice(*first)
+            factor = ContactLast(
+                functions,
+                whole,
+                last,
+                whole=_make_gatherer(comm.mpi, mat),
+                mine=slice(*mat.getOwnershipRange()),
             )
     except ArithmeticError:
         pass
-    return None if largest(comm, made is None) else made
+    # all ranks have a factor, or none: one without would leave the others alone in a solve
+    return None if largest(comm, factor is None) else factor
 
 
-def product_of_rows(matrix: Any) -> Callable[[Array], Array]:
-    """Return what multiplies a matrix on one rank with every row of x.
+def make_product_of_rows(matrix: Any) -> Callable[[Array], Array]:
+    """Return a function X (k, n) -> the rows A x of its rows x, (k, n), on one rank.
 
-    It reads the matrix once for eight of them.
+    The compiled loop reads A once for ``AT_ONCE`` rows of X: the product is bound by memory, and
+    rows one by one would read it k times.
     """
     functions = load_loops(SerialComm())
     A = rows_of(matrix.mat)
     n = matrix.rows
     if functions is None or A.indices.dtype != np.int32:
         return lambda x: np.stack([matrix @ row for row in x])
-    kept = A.indptr, A.indices, A.data, np.empty(AT_ONCE * n)
-    *before, room = locate_arrays(*kept)
+    arrays = A.indptr, A.indices, A.data, np.empty(AT_ONCE * n)
+    *entries, room = locate_arrays(*arrays)
 
-    def product(x: Array, _: Any = kept) -> Array:  # which holds what lies there
-        x, made = np.ascontiguousarray(x), np.empty(x.shape)
-        b, out = locate_arrays(x, made)
-        functions.product_many(len(x), n, *before, b, room, out)
-        return made
+    # the default argument keeps the arrays alive whose addresses the loop reads
+    def multiply(x: Array, _: Any = arrays) -> Array:
+        x = np.ascontiguousarray(x)
+        products = np.empty(x.shape)
+        x_address, products_address = locate_arrays(x, products)
+        functions.product_many(len(x), n, *entries, x_address, room, products_address)
+        return products
 
-    return product
+    return multiply
 
 
-def _gathering(mpi: Any, mat: Any) -> Callable[[Array], Array]:
-    """Return what gathers the owned entries of a vector, into one array again and again."""
+def _make_gatherer(mpi: Any, mat: Any) -> Callable[[Array], Array]:
+    """Return a function that gathers a vector of all ranks. Collective when called.
+
+    It writes into one array again and again: what it returned before is overwritten.
+    """
     ends = mat.getOwnershipRanges()
     counts = np.diff(ends)
-    x = np.empty(ends[-1])
+    whole = np.empty(ends[-1])
 
-    def whole(b: Array) -> Array:
-        mpi.Allgatherv(np.ascontiguousarray(b), [x, counts])
-        return x
+    def gather(b: Array) -> Array:
+        mpi.Allgatherv(np.ascontiguousarray(b), [whole, counts])
+        return whole
 
-    return whole
+    return gather

@@ -17,9 +17,8 @@ from ...core.errors import InputError
 log = logging.getLogger(__name__)
 FULL_ROW = 40.0  # entries of a row: 2D meshes have fewer, 3D meshes more
 FEW_ROWS = 10_000  # with full rows: beyond, MUMPS' dense blocks pay
-COPIED_ROWS = (
-    300_000  # with sparse rows: a copy of the factor on every rank takes about 0.5 GB here
-)
+# with sparse rows: a copy of the factor on every rank takes about 0.5 GB here
+COPIED_ROWS = 300_000
 ZERO_PIVOT = (71, 81)  # errors of PETSc: a zero pivot of LU, of Cholesky
 MEMORY = (55,)  # PETSC_ERR_MEM
 OUT_OF_MEMORY = 3  # PC_FACTOR_OUTMEMORY
@@ -28,18 +27,18 @@ MUMPS_MEMORY = (-8, -9, -11, -13, -14, -15, -17, -18, -19, -20)
 
 
 def ordering() -> str:
-    """Return the order of elimination that PETSc's own factorisation takes.
+    """Return PETSc's name of the order of elimination for its own factorisation.
 
-    It is minimum degree, which is of SuiteSparse, or without it nested dissection, which is
-    PETSc's.
+    This is minimum degree, which needs SuiteSparse, or PETSc's nested dissection without it.
     """
     return "amd" if packages.petsc_has("amd") else "nd"
 
 
 def own_serves(mat: Any) -> bool:
-    """Say whether PETSc's own factorisation is the better one. Collective.
+    """Say whether PETSc's own factorisation is faster than MUMPS. Collective.
 
-    It is for sparse rows (2D), or few; on several ranks not too many.
+    It is where rows are sparse (2D), on several ranks not too many of them, since each rank keeps a
+    copy of the factor; and where rows are full (3D) but few.
     """
     rows = max(mat.getSize()[0], 1)
     if mat.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"] > FULL_ROW * rows:
@@ -48,10 +47,10 @@ def own_serves(mat: Any) -> bool:
 
 
 def by_mumps(mat: Any, *, symmetric: bool, own: bool) -> bool:
-    """Say whether MUMPS factorises: where it is the better one, if PETSc has it.
+    """Say whether MUMPS factorises: where it is the better one, if PETSc has it. Collective.
 
-    The log says what is taken instead of what is missing, unless options of the user choose
-    (``own``). Collective.
+    The log tells what takes the place of packages that this PETSc lacks, unless options of the user
+    choose the factor.
 
     Args:
         mat: the PETSc matrix.
@@ -59,13 +58,13 @@ def by_mumps(mat: Any, *, symmetric: bool, own: bool) -> bool:
         own: whether options of the user choose the factor.
     """
     serves = symmetric and own_serves(mat)
-    mumps = packages.petsc_has("mumps") and not serves
-    missing = (
-        []
-        if packages.petsc_has("cholmod") and packages.petsc_has("amd")
-        else ["SuiteSparse (CHOLMOD, AMD)"]
-    )
-    missing += [] if packages.petsc_has("mumps") or serves else ["MUMPS"]
+    has_mumps = packages.petsc_has("mumps")
+    mumps = has_mumps and not serves
+    missing = []
+    if not (packages.petsc_has("cholmod") and packages.petsc_has("amd")):
+        missing.append("SuiteSparse (CHOLMOD, AMD)")
+    if not (has_mumps or serves):
+        missing.append("MUMPS")
     if missing and not own and mat.comm.rank == 0:
         kind = "Cholesky" if symmetric else "LU"
         taken = "MUMPS" if mumps else f"PETSc's own {kind}, ordered by '{ordering()}'"
@@ -77,10 +76,10 @@ def by_mumps(mat: Any, *, symmetric: bool, own: bool) -> bool:
 
 
 def failure(pc: Any, mat: Any, error: Any = None) -> InputError:
-    """Return what to raise of a factorisation that failed.
+    """Return the error to raise for a factorisation that failed, with its cause and the remedy.
 
-    PETSc raised ``error``, or solved to numbers that are not finite. Collective where nothing was
-    raised.
+    A factorisation fails where PETSc raises, or where it solves to numbers that are not finite
+    without a word. The call is collective in the second case.
 
     Args:
         pc: the preconditioner that was to factorise.
@@ -88,38 +87,47 @@ def failure(pc: Any, mat: Any, error: Any = None) -> InputError:
         error: what PETSc raised, or None.
     """
     rows = mat.getSize()[0]
-    said = "" if error is None else str(error).splitlines()[-1].split("] ", 1)[-1].strip()
-    code = 0 if error is None else error.ierr
-    reason = _reason(pc, mat) if error is None else None
+    message = ""
+    code = 0
+    reason = None
+    if error is None:
+        reason = _find_reason(pc, mat)
+    else:
+        # the last line of PETSc's text is "[rank] what is wrong"
+        message = str(error).splitlines()[-1].split("] ", 1)[-1].strip()
+        code = error.ierr
     if code in MEMORY or reason == "memory":
         return InputError(
             f"there is not enough memory to factorise the effective matrix of {rows} unknowns: "
             "take Iterative(), which factorises nothing, or more memory"
         )
-    # a row of a symmetric matrix without one: no positive definite matrix
-    no_diagonal = "missing diagonal" in said
+    # a symmetric matrix with a row that has no diagonal entry is not positive definite
+    no_diagonal = "missing diagonal" in message
     if code in ZERO_PIVOT or no_diagonal or reason == "singular":
         return InputError(
             "the effective matrix cannot be factorised: it is singular or contains NaN: check the "
             "materials, and that every part of the body is clamped or has mass"
         )
-    what = f"error {code}, {said}" if error is not None else reason
+    cause = reason if error is None else f"error {code}, {message}"
     return InputError(
-        f"PETSc cannot factorise the effective matrix ({what}): take Iterative(), which factorises "
-        "nothing, or another factorisation by PETSc's options vi_contact_factor_…"
+        f"PETSc cannot factorise the effective matrix ({cause}): take Iterative(), which "
+        "factorises nothing, or another factorisation by PETSc's options vi_contact_factor_…"
     )
 
 
-def _reason(pc: Any, mat: Any) -> str:
-    """Return why a factor gives numbers that are not finite.
+def _find_reason(pc: Any, mat: Any) -> str:
+    """Return why a factor gives numbers that are not finite, the same on every rank. Collective.
 
-    It is memory, or the matrix, or what MUMPS says of neither.
+    The reason is "memory", "singular", or the words of MUMPS for another one. Where ranks differ
+    the first that is not "singular" counts, as memory may be short on one rank only.
     """
-    found = [_failed(pc)] if mat.comm.size == 1 else mat.comm.tompi4py().allgather(_failed(pc))
-    return next((one for one in found if one != "singular"), "singular")
+    cause = _find_cause(pc)
+    causes = [cause] if mat.comm.size == 1 else mat.comm.tompi4py().allgather(cause)
+    return next((cause for cause in causes if cause != "singular"), "singular")
 
 
-def _failed(pc: Any) -> str:
+def _find_cause(pc: Any) -> str:
+    """Return the reason that this rank knows (``_find_reason``)."""
     if hasattr(pc, "getFailedReason") and pc.getFailedReason() == OUT_OF_MEMORY:
         return "memory"
     if pc.getType() not in ("cholesky", "lu") or pc.getFactorSolverType() != "mumps":

@@ -1,6 +1,4 @@
-"""Store the symmetric matrices of large systems compactly.
-
-This is one half, and after a change of basis what it changed.
+"""Store the symmetric matrices of large systems compactly: a half, and rows that a basis changed.
 
 Half of K in blocks of nodes takes 0.2 kB an unknown on tetrahedra where AIJ takes 0.53, and its
 product half the time; of M, whose components are not coupled along the axes, only what is not zero
@@ -25,7 +23,7 @@ SAMPLE = 1000  # nodes at which these are counted
 
 
 class Half(PetscMatrix):
-    """Hold one half of a symmetric matrix (SBAIJ)."""
+    """Hold the upper half of a symmetric matrix, in blocks of nodes (PETSc's SBAIJ)."""
 
     @property
     def mat(self) -> Any:
@@ -36,7 +34,11 @@ class Half(PetscMatrix):
 
     @property
     def bytes(self) -> float:
-        """Return the bytes of the half that is stored."""
+        """Return the bytes of the half that is stored.
+
+        Of the 12 bytes of an entry and its column, 8 are the entry, and a block of b² entries
+        shares the 4 of one column: (8 + 4/b²)/12 = (2 + b⁻²)/3 (with 64-bit columns about so).
+        """
         return super().bytes * (2.0 + self.stored.getBlockSize() ** -2) / 3.0
 
     def transpose_apply(self, x: Array) -> Array:
@@ -45,12 +47,17 @@ class Half(PetscMatrix):
 
 
 class Replaced(PetscMatrix):
-    """Hold a symmetric matrix that is another but for ``part``, some owned rows.
-
-    ``alike``: same places.
-    """
+    """Hold a symmetric matrix that is another one, ``base``, but for some owned rows."""
 
     def __init__(self, base: PetscMatrix, rows: Indices, part: Any, alike: bool) -> None:
+        """Hold base and the rows that differ.
+
+        Args:
+            base: the other matrix, which is shared and not copied.
+            rows: (k,) which owned rows differ, counted from 0 on this rank.
+            part: (k owned rows, all columns) these rows, an AIJ matrix.
+            alike: whether their entries are at the places of those of base, on all ranks.
+        """
         super().__init__(part)
         self._base = base
         self._rows = rows
@@ -67,7 +74,9 @@ class Replaced(PetscMatrix):
         whole = self._base.mat
         part = rows_of(self.stored)
         kind = PETSc.IntType
-        whole = whole.copy() if whole is self._base.stored else whole
+        if whole is self._base.stored:
+            whole = whole.copy()
+        # entries at the places of others are written over them; else the rows are stacked anew
         if self._alike:
             rows = (whole.getOwnershipRange()[0] + self._rows).astype(kind)
             whole.setValuesIJV(
@@ -95,6 +104,8 @@ class Replaced(PetscMatrix):
     def diagonal(self) -> Array:
         """Return the diagonal entries of the owned rows."""
         values = self._base.diagonal()
+        # of the entries of the changed rows, those whose column is their row; rows without a
+        # diagonal entry have zero
         part = rows_of(self.stored)
         row = np.repeat(self._rows, np.diff(part.indptr))
         own = part.indices == self.stored.getOwnershipRangeColumn()[0] + row
@@ -111,12 +122,13 @@ class CompactAlgebra(PetscAlgebra):
         self._dimension = dimension
 
     def congruence(self, T: Matrix, K: Matrix) -> Matrix:
-        """Return Tᵀ K T."""
+        """Return Tᵀ K T, which shares the rows with K that T leaves as they are. Collective."""
         P = as_petsc(T).mat
         A = as_petsc(K).mat
-        rows = self._changed(P, A)
+        rows = self._find_changed_rows(P, A)
         if total(self.comm, len(rows)) > 0.5 * A.getSize()[0]:
-            return self.held(triple_product(A, P))
+            return self.store(triple_product(A, P))
+        # of the rows c that change, (Pᵀ A P)_c = (P_cc)ᵀ A_c P: P is the identity beside them
         first, last = A.getOwnershipRange()
         chosen = PETSc.IS().createGeneral((first + rows).astype(PETSc.IntType), comm=A.comm)
         every = PETSc.IS().createStride(last - first, first, 1, comm=A.comm)
@@ -129,8 +141,15 @@ class CompactAlgebra(PetscAlgebra):
         give_back(self.comm.mpi)
         return Replaced(as_petsc(K), rows, part, alike=not largest(self.comm, not alike))
 
-    def held(self, mat: Any) -> PetscMatrix:
-        """Return the matrix stored compactly; the given one is destroyed."""
+    def store(self, mat: Any) -> PetscMatrix:
+        """Return the matrix stored compactly; ``mat`` is destroyed. Collective.
+
+        Arrays are let go as soon as they have been read: at this place a large run takes the most
+        memory.
+
+        Args:
+            mat: a symmetric PETSc matrix, AIJ, that nobody else needs.
+        """
         give_back(self.comm.mpi)
         rows = rows_of(mat)
         first = mat.getOwnershipRange()[0]
@@ -138,38 +157,48 @@ class CompactAlgebra(PetscAlgebra):
         n, size = rows.shape
         kind = PETSc.IntType
         mat.destroy()
+
+        # blocks of nodes, where every node has all its unknowns here and few entries are zeros
+        divides = n % width == 0 and size % width == 0
         odd, wasted = self.comm.sum(
-            np.array([n % width, 0.0 if n % width or size % width else _wasted(rows, width)])
+            np.array([n % width, _count_waste(rows, width) if divides else 0.0])
         )
         if odd or wasted > 0.0:
+            # else single entries: those that are not zero, and the diagonal, as PETSc expects
             width = 1
-            kept = rows.data != 0.0
+            used = rows.data != 0.0
             every = np.arange(n, dtype=kind)
-            # and the diagonal, as PETSc expects
-            row = np.append(np.repeat(every, np.diff(rows.indptr))[kept], every)
-            values = np.append(rows.data[kept], np.zeros(n))
-            columns = np.append(rows.indices[kept], first + every)
+            row = np.append(np.repeat(every, np.diff(rows.indptr))[used], every)
+            values = np.append(rows.data[used], np.zeros(n))
+            columns = np.append(rows.indices[used], first + every)
             del rows
             rows = sp.csr_matrix((values, (row, columns)), shape=(n, size))
-            del values, row, columns, kept
+            del values, row, columns, used
+
+        # the upper half of these blocks, on all ranks of one width
         ends, columns, values = take_upper_blocks(rows, width, first)
         del rows
         arrays = (ends.astype(kind), columns.astype(kind), values)
-        made = PETSc.Mat().createSBAIJ(
+        half = PETSc.Mat().createSBAIJ(
             ((n, None), (n, None)), width, csr=arrays, comm=self.comm.mpi
         )
-        made.assemble()
+        half.assemble()
         del arrays, ends, columns, values
         give_back(self.comm.mpi)
-        return Half(made)
+        return Half(half)
 
-    def _changed(self, P: Any, A: Any) -> Indices:
-        """Return the owned rows in which PᵀAP may differ from A, ascending. Collective."""
+    def _find_changed_rows(self, P: Any, A: Any) -> Indices:
+        """Return the owned rows in which PᵀAP may differ from A, ascending. Collective.
+
+        These are the rows in which P is not the identity, the columns that these rows of P have,
+        and, as A is symmetric, the rows that A couples with them.
+        """
         rows = rows_of(P)
         first = P.getOwnershipRange()[0]
         changed = np.flatnonzero(np.diff(sp.csr_matrix(rows - sp.eye(*rows.shape, k=first)).indptr))
-        reached = [self.entries(PetscMatrix(one), changed).indices for one in (P, A)]
+        reached = [self.entries(PetscMatrix(matrix), changed).indices for matrix in (P, A)]
         columns = np.unique(np.concatenate([first + changed, *reached])).astype(PETSc.IntType)
+        # rows of any rank are marked by the ranks that reach them
         marks = A.createVecLeft()
         marks.setValues(columns, np.ones(len(columns)))
         marks.assemble()
@@ -179,7 +208,7 @@ class CompactAlgebra(PetscAlgebra):
 def algebra_for(
     comm: Any, dimension: int, unknowns: int, *, symmetric: bool = True
 ) -> PetscAlgebra:
-    """Return the algebra for the matrices of a body of this size.
+    """Return the algebra that stores the matrices of a body of this size best.
 
     Args:
         comm: the communicator.
@@ -189,22 +218,23 @@ def algebra_for(
     """
     if not symmetric:
         return UnsymmetricAlgebra(comm)
-    return (
-        CompactAlgebra(comm, dimension)
-        if dimension == 3 and unknowns >= COMPACT
-        else PetscAlgebra(comm)
-    )
+    if dimension == 3 and unknowns >= COMPACT:
+        return CompactAlgebra(comm, dimension)
+    return PetscAlgebra(comm)
 
 
-def _wasted(rows: sp.csr_matrix, width: int) -> float:
-    """Return how many of the entries in blocks are too many, by some nodes all over the rows.
+def _count_waste(rows: sp.csr_matrix, width: int) -> float:
+    """Return how many entries blocks would have beyond ``WASTE`` times those that are not zero.
 
-    ``width``: unknowns of a node, which a block is of.
+    At most ``SAMPLE`` nodes all over the rows are counted. Blocks pay where the sum over all ranks
+    is not above zero.
+
+    Args:
+        rows: (n, columns of all ranks) owned rows.
+        width: unknowns of a node, the size of a block.
     """
-    nodes = (
-        np.unique(np.linspace(0, rows.shape[0] // width - 1, SAMPLE).astype(int))
-        if rows.shape[0]
-        else []
-    )
-    some = rows[(width * np.asarray(nodes, dtype=int)[:, None] + np.arange(width)).ravel()]
-    return float(some.tobsr((width, width)).nnz - WASTE * np.count_nonzero(some.data))
+    nodes = np.zeros(0, dtype=int)
+    if rows.shape[0]:
+        nodes = np.unique(np.linspace(0, rows.shape[0] // width - 1, SAMPLE).astype(int))
+    sample = rows[(width * nodes[:, None] + np.arange(width)).ravel()]
+    return float(sample.tobsr((width, width)).nnz - WASTE * np.count_nonzero(sample.data))

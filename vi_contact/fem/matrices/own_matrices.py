@@ -1,11 +1,9 @@
-"""Make the system of matrices that come from anywhere.
-
-This is a user's own elements, another program, beams and frames.
+"""Make a system of matrices from elsewhere: own elements, another program, beams and frames.
 
     M u'' + C u' + K u = f(t),   M symmetric and positive (semi)definite
 
-Rows that stand still are eliminated here, so that weight and ground motion count the mass that they
-share with others.
+Rows that stand still are eliminated here, and not by the user, so that weight and ground motion
+count the mass that they share with others. ``petsc_system`` takes matrices of several ranks.
 """
 
 from collections.abc import Mapping, Sequence
@@ -76,19 +74,18 @@ def system_from_arrays(
             symmetric or has masses below zero; coordinates, unknowns or vectors that do not fit
             them.
     """
-    matrices = {
-        name: _serial(name, A)
-        for name, A in (("M", M), ("C", C), ("K", K))
-        if name != "C" or A is not None
-    }
+    named = {"M": M, "C": C, "K": K}
+    if C is None:
+        del named["C"]
+    matrices = {name: _copy_matrix(name, A) for name, A in named.items()}
     n = matrices["K"].csr.shape[0]
-    for name, one in matrices.items():
-        if one.csr.shape != (n, n):
+    for name, matrix in matrices.items():
+        if matrix.csr.shape != (n, n):
             raise InputError(
-                f"{OWNER}: {name} has shape {one.csr.shape} and K has {n} rows; give square "
+                f"{OWNER}: {name} has shape {matrix.csr.shape} and K has {n} rows; give square "
                 "matrices of one size"
             )
-    given = {
+    arguments = {
         "coordinates": coordinates,
         "unknowns": unknowns,
         "clamped": clamped,
@@ -96,15 +93,15 @@ def system_from_arrays(
         "u0": u0,
         "v0": v0,
     }
-    return own_system(OWNER, SerialAlgebra(), SerialAlgebra(symmetric=False), matrices, given)
+    return own_system(OWNER, SerialAlgebra(), SerialAlgebra(symmetric=False), matrices, arguments)
 
 
-def _serial(name: str, value: Any) -> SerialMatrix:
-    """Return a copy of a matrix, of a vector as its diagonal."""
+def _copy_matrix(name: str, value: Any) -> SerialMatrix:
+    """Return a copy of a sparse or dense matrix, or for M of a vector that is its diagonal."""
     if not sp.issparse(value):
-        lumped = name == "M" and np.ndim(value) == 1
-        found = array(OWNER, name, value, (None,) if lumped else (None, None))
-        return SerialMatrix(sp.diags([found], [0]) if lumped else found)
+        if name == "M" and np.ndim(value) == 1:
+            return SerialMatrix(sp.diags([array(OWNER, name, value, (None,))], [0]))
+        return SerialMatrix(array(OWNER, name, value, (None, None)))
     if value.dtype.kind not in "iuf":
         raise InputError(f"{OWNER}: {name} has entries of type {value.dtype}; give real numbers")
     return SerialMatrix(sp.csr_matrix(value, dtype=float, copy=True))
@@ -115,23 +112,29 @@ def own_system(
     algebra: Algebra,
     unsymmetric: Algebra,
     matrices: Mapping[str, Matrix],
-    given: Mapping[str, Any],
+    arguments: Mapping[str, Any],
 ) -> SemiDiscreteSystem:
     """Return the system of matrices M, K and perhaps C of one size. Collective.
 
-    What is given of this rank's rows and nodes is checked here.
+    With the free rows F of the matrices the system is M_FF u'' + C_FF u' + K_FF u = f_F.
 
     Args:
         owner: who asks.
         algebra: that of symmetric matrices.
         unsymmetric: that for C or K that are not symmetric.
         matrices: M, K and perhaps C, of n owned rows.
-        given: the other arguments by name.
+        arguments: the other arguments of ``system_from_arrays`` by name, for the rows and nodes of
+            this rank; they are checked here.
+
+    Raises:
+        InputError: on all ranks, what ``system_from_arrays`` refuses.
     """
     comm = algebra.comm
     n = matrices["K"].rows
-    points, block, component, free = on_all(comm, owner, lambda: _meaning(owner, n, given))
-    load, u0, v0 = on_all(comm, owner, lambda: _vectors(owner, n, given))
+
+    # what the rows mean, and what acts on them
+    points, block, component, free = on_all(comm, owner, lambda: _read_rows(owner, n, arguments))
+    load, u0, v0 = on_all(comm, owner, lambda: _read_vectors(owner, n, arguments))
     d = points.shape[1]
     refuse(
         [
@@ -141,19 +144,27 @@ def own_system(
         ],
         comm,
     )
+
+    # matrices that no system may have are refused; those that are not symmetric need an algebra
+    # of their own
     numbers = algebra.first(n) + np.arange(n)
     refuse(list(find_matrix_defects(owner, comm, numbers, **matrices)), comm)
     skew = [name for name, A in matrices.items() if measure_asymmetry(A, comm, numbers) > SYMMETRIC]
-    algebra = unsymmetric if skew else algebra
-    every = matrices["M"]
+    if skew:
+        algebra = unsymmetric
+
+    # eliminate the rows that stand still
+    whole_mass = matrices["M"]
     influence = (component[:, None] == np.arange(d)).astype(float)
     if largest(comm, not free.all()):
         matrices = {name: algebra.block(A, free) for name, A in matrices.items()}
         load = load.in_basis(SerialMatrix(sp.identity(n, format="csc")[:, free]))
     M = matrices["M"]
     K = matrices["K"]
-    # of rows that stand still, when all move
-    momenta = [(every @ r)[free] - M @ r[free] for r in influence.T]
+
+    # M_FH r_H: what the mass that free rows F share with held ones H adds to the momenta of F when
+    # everything moves by the unit translation r
+    momenta = [(whole_mass @ r)[free] - M @ r[free] for r in influence.T]
     massless = M.diagonal() == 0.0
     space = MatrixSpace(algebra, points, block[free], component[free], K)
     rigid = influence[free]
@@ -177,29 +188,36 @@ def own_system(
     )
 
 
-def _meaning(owner: str, n: int, given: Mapping[str, Any]) -> tuple[Array, Indices, Indices, Mask]:
-    """Return (points, node of each row, component of each row, rows that are free).
+def _read_rows(
+    owner: str, n: int, arguments: Mapping[str, Any]
+) -> tuple[Array, Indices, Indices, Mask]:
+    """Return what the rows mean: points (k, d), node (n,), component (n,), free (n,).
 
     Args:
         owner: who asks.
         n: how many rows this rank owns.
-        given: arguments by name.
+        arguments: by name, ``coordinates``, ``unknowns`` and ``clamped``.
+
+    Raises:
+        InputError: they do not fit the rows.
     """
-    points = array(owner, "coordinates", given["coordinates"], (None, None), unit="metres")
+    points = array(owner, "coordinates", arguments["coordinates"], (None, None), unit="metres")
     k, d = points.shape
     if d not in (1, 2, 3):
         raise InputError(
             f"{owner}: coordinates has shape {points.shape}; give 1, 2 or 3 coordinates of every "
             "node"
         )
-    if given["unknowns"] is None and n != k * d:
+    # each row is a component of a node, by default all components node by node; no two rows are
+    # the same one
+    if arguments["unknowns"] is None and n != k * d:
         raise InputError(
             f"{owner}: K has {n} rows, and {k} nodes have {k * d} components; give unknowns=, the "
             "node and the component of every row"
         )
     table = np.column_stack(np.divmod(np.arange(n), d))
-    if given["unknowns"] is not None:
-        table = integers(owner, "unknowns", given["unknowns"], (n, 2))
+    if arguments["unknowns"] is not None:
+        table = integers(owner, "unknowns", arguments["unknowns"], (n, 2))
     block, component = table.T
     wrong = (block < 0) | (block >= k) | (component < -1) | (component >= d)
     if wrong.any():
@@ -213,7 +231,9 @@ def _meaning(owner: str, n: int, given: Mapping[str, Any]) -> tuple[Array, Indic
         raise InputError(
             f"{owner}: component {c} of node {node} has several rows in unknowns; give it one"
         )
-    rows = integers(owner, "clamped", given["clamped"], (None,))
+
+    # rows that are not clamped are free
+    rows = integers(owner, "clamped", arguments["clamped"], (None,))
     free = np.ones(n, dtype=bool)
     if len(rows) and not 0 <= rows.min() <= rows.max() < n:
         raise InputError(
@@ -224,26 +244,29 @@ def _meaning(owner: str, n: int, given: Mapping[str, Any]) -> tuple[Array, Indic
     return points, block, component, free
 
 
-def _vectors(owner: str, n: int, given: Mapping[str, Any]) -> tuple[Load, Array, Array]:
+def _read_vectors(owner: str, n: int, arguments: Mapping[str, Any]) -> tuple[Load, Array, Array]:
     """Return the load and initial values of all rows, zero where there are none.
 
     Args:
         owner: who asks.
         n: how many rows this rank owns.
-        given: arguments by name.
+        arguments: by name, ``load``, ``u0`` and ``v0``.
+
+    Raises:
+        InputError: vectors that do not fit the rows.
     """
+    load = arguments["load"]
+    if not isinstance(load, Load):
+        load = Load(_read_vector(owner, "load", load, n, "N"))
+    for vector in (load.constant, *(part for part, _ in load.separable)):
+        _read_vector(owner, "a vector of load", vector, n, "N")
+    u0 = _read_vector(owner, "u0", arguments["u0"], n, "m")
+    return load, u0, _read_vector(owner, "v0", arguments["v0"], n, "m/s")
 
-    def vector(name: str, value: Any, unit: str) -> Array:
-        return np.zeros(n) if value is None else array(owner, name, value, (n,), unit=unit)
 
-    load = (
-        given["load"]
-        if isinstance(given["load"], Load)
-        else Load(vector("load", given["load"], "N"))
-    )
-    for one in (load.constant, *(part for part, _ in load.separable)):
-        vector("a vector of load", one, "N")
-    return load, vector("u0", given["u0"], "m"), vector("v0", given["v0"], "m/s")
+def _read_vector(owner: str, name: str, value: Any, n: int, unit: str) -> Array:
+    """Return n numbers, zeros for None; ``owner``, ``name`` and ``unit`` are for messages."""
+    return np.zeros(n) if value is None else array(owner, name, value, (n,), unit=unit)
 
 
 class MatrixSpace(NodalSpace):
@@ -274,19 +297,25 @@ class MatrixSpace(NodalSpace):
         self.points = points
         k, d = points.shape
         n = len(block)
+
+        # nodes and unknowns have numbers over the ranks, those of a rank in a row
         first = algebra.first(len(block))
         self.dimension = d
         self.unknowns = round(total(self.comm, n))
         self.nodes = algebra.first(k) + np.arange(k)
         self.size = bounding_box(self.comm, points)
         self.component = component
+
+        # tables from the component of a node to its unknown, -1 where there is none
         moves = component >= 0
         every = np.arange(n)
         self.free_index = np.full(k * d, -1)
         self.free_index[(block * d + component)[moves]] = every[moves]
         self.numbers = np.where(self.free_index >= 0, first + self.free_index, -1).reshape(k, d)
         self.held = self.numbers < 0
-        others = d * (round(total(self.comm, k)) + first + every)  # each is a node by itself
+
+        # numbers on any ranks: what is no displacement counts as a node by itself, after the nodes
+        others = d * (round(total(self.comm, k)) + first + every)
         self.ids = np.where(moves, self.nodes[block] * d + component, others)
         self.coordinates = points[block]
         self.bodies = bodies_of(algebra, K, block)
@@ -295,7 +324,8 @@ class MatrixSpace(NodalSpace):
 def bodies_of(algebra: Algebra, K: Matrix, block: Indices) -> Indices:
     """Return the body (0, 1, ..., by least numbers) of each owned unknown. Collective.
 
-    Bodies are in the order of least numbers; K or a node joins those of one body.
+    Unknowns are of one body where an entry of K or a node joins them. Bodies are in the order of
+    their least unknowns.
 
     Args:
         algebra: that of K.
@@ -307,12 +337,15 @@ def bodies_of(algebra: Algebra, K: Matrix, block: Indices) -> Indices:
     entries = algebra.entries(K, np.arange(n))
     own = first + np.arange(n)
     entries.eliminate_zeros()
+    # links: each row to the first row of its node, and to the columns of its entries
     _, leader, node = np.unique(block, return_index=True, return_inverse=True)
     row = np.concatenate([own, np.repeat(own, np.diff(entries.indptr))])
     column = np.concatenate([first + leader[node.ravel()], entries.indices])
-    numbers = np.union1d(own, column)  # those of other ranks too
+    # the same by places among all unknowns that this rank knows, some of which others own; what
+    # an entry between two ranks joins, both ranks share
+    numbers = np.union1d(own, column)
     away = (column < first) | (column >= first + n)
-    one = np.searchsorted(numbers, row)
-    two = np.searchsorted(numbers, column)
-    shared = np.union1d(one[away], two[away])
-    return parts_of(algebra.comm, one, two, numbers, shared)[np.searchsorted(numbers, own)]
+    start = np.searchsorted(numbers, row)
+    end = np.searchsorted(numbers, column)
+    shared = np.union1d(start[away], end[away])
+    return parts_of(algebra.comm, start, end, numbers, shared)[np.searchsorted(numbers, own)]

@@ -1,6 +1,8 @@
 """Implement the algebra protocol on PETSc matrices, on any number of ranks.
 
-MUMPS factorises, vectors are of numpy.
+Vectors are numpy arrays of the entries that a rank owns (``core.algebra``). Every product goes
+through two PETSc vectors whose memory is shared by all matrices of one size. Which factorisation is
+taken: ``PetscFactor``.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -16,7 +18,7 @@ from petsc4py import PETSc
 from ...core.algebra import Array, Factor, Indices, Mask, Matrix, build_identity_with_rows, total
 from ...kernels.contact_last import ContactLast
 from ..mesh.communicators import MpiComm, give_back
-from .copied_factor import contact_last, product_of_rows
+from .copied_factor import contact_last, make_product_of_rows
 from .direct import by_mumps, failure, finite, ordering, own_serves
 from .petsc_rows import aij_of, rows_of
 
@@ -28,10 +30,11 @@ _ENTRY = 8 + np.dtype(PETSc.IntType).itemsize  # bytes of an entry and its colum
 RIGHT_SIDES = 64  # right-hand sides per block solve: bounds the memory of the dense blocks
 
 
-def _vector(comm: Any, size: int, way: int) -> tuple[Array, Any]:
-    """Return room that all matrices share, and a vector in it.
+def _make_vector(comm: Any, size: int, way: int) -> tuple[Array, Any]:
+    """Return an array that matrices of one size share, and a PETSc vector in it.
 
-    A product needs it only for as long as it takes.
+    A product needs it only for as long as it takes, so that a vector for each matrix would waste
+    memory.
 
     Args:
         comm: the communicator.
@@ -44,6 +47,7 @@ def _vector(comm: Any, size: int, way: int) -> tuple[Array, Any]:
     return room, PETSc.Vec().createWithArray(room, (size, None), comm=comm)
 
 
+# the shared arrays by (size, way); one goes with the last matrix that uses it
 _ROOM: WeakValueDictionary[tuple[int, int], Array] = WeakValueDictionary()
 
 
@@ -56,10 +60,9 @@ class PetscMatrix:
 
     def __init__(self, mat: Any) -> None:
         self.stored = mat
-        sizes = mat.getLocalSize()
-        (self._in, self._x), (self._out, self._y) = (
-            _vector(mat.comm, sizes[way], way) for way in (1, 0)
-        )
+        rows, columns = mat.getLocalSize()
+        self._in, self._x = _make_vector(mat.comm, columns, 1)
+        self._out, self._y = _make_vector(mat.comm, rows, 0)
 
     @property
     def mat(self) -> Any:
@@ -85,7 +88,7 @@ class PetscMatrix:
 
     @cached_property
     def _rows_by(self) -> Callable[[Array], Array]:
-        return product_of_rows(self)
+        return make_product_of_rows(self)
 
     def transpose_apply(self, x: Array) -> Array:
         """Return Aᵀ x."""
@@ -99,19 +102,29 @@ class PetscMatrix:
 
 
 class PetscFactor:
-    """Hold a Cholesky factor and its substitutions.
+    """Factorise a matrix by PETSc, A = L Lᵀ or A = L U, and solve with the factor.
 
-    For matrices without contact unknowns, and where CHOLMOD is not to be had: PETSc's own
-    factorisation with minimum degree ordering where it serves (``own_serves``): its substitutions
-    are 4 to 15 times as fast as those of MUMPS. On several ranks each keeps a whole copy of it, so
-    that results do not depend on the order of messages, as those of MUMPS do. MUMPS takes the rest:
-    large 3D matrices on several ranks, and what is too large to be copied. Where PETSc has no MUMPS
-    its own factorisation takes all, and without SuiteSparse nested dissection orders it; the log
-    says so. Options with the prefix vi_contact_factor_ choose otherwise. InputError when the matrix
-    cannot be factorised. ``symmetric`` False: LU of MUMPS.
+    This serves matrices without contact unknowns, and all where CHOLMOD is missing
+    (``copied_factor``). PETSc's own factorisation with minimum degree ordering is taken where it is
+    the better one (``own_serves``): its substitutions are 4 to 15 times as fast as those of MUMPS.
+    On several ranks each keeps a whole copy of it, so that results do not depend on the order of
+    messages, as those of MUMPS do. MUMPS takes the rest: large 3D matrices on several ranks, and
+    what is too large to be copied. Where PETSc has no MUMPS its own factorisation takes all, and
+    without SuiteSparse nested dissection orders it; the log says so. Options with the prefix
+    vi_contact_factor_ choose otherwise.
+
+    Raises:
+        InputError: the matrix cannot be factorised.
     """
 
     def __init__(self, matrix: PetscMatrix, *, symmetric: bool = True) -> None:
+        """Factorise. Collective.
+
+        Args:
+            matrix: A, square.
+            symmetric: whether A is symmetric and positive definite; else its LU is computed, by
+                MUMPS where PETSc has it.
+        """
         mat = matrix.mat
         mat.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)
         kind = "cholesky" if symmetric else "lu"
@@ -144,28 +157,30 @@ class PetscFactor:
             self._set_up()
 
     def _set_up(self) -> None:
+        """Factorise, and try the factor on a vector of ones; InputError where it fails."""
         try:
             self._pc.setUp()
             self._b.set(1.0)
-            # PETSc fills it with infinity when the factorisation failed
+            # PETSc fills the answer with infinity when the factorisation failed
             self._pc.apply(self._b, self._x)
-            found = finite(self._x)
+            succeeded = finite(self._x)
         except PETSc.Error as error:
             raise failure(self._pc, self._mat, error) from error
-        if not found:
+        if not succeeded:
             raise failure(self._pc, self._mat)
 
     @property
     def bytes(self) -> float:
         """Return the bytes of the entries, an equal share on each rank.
 
-        They are 0 for factors that tell nothing, as copies.
+        They are 0 for factors that do not tell, such as copies (PETSc's ``redundant``).
         """
         if self._pc.getType() not in ("cholesky", "lu"):
             return 0.0
-        # MUMPS counts many in millions, below zero
         count = self._pc.getFactorMatrix().getInfo()["nz_used"]
-        return _ENTRY * (count if count >= 0.0 else -1e6 * count) / self._b.comm.size
+        if count < 0.0:
+            count = -1e6 * count  # MUMPS gives large numbers in millions, as negative ones
+        return _ENTRY * count / self._b.comm.size
 
     def solve(self, b: Array) -> Array:
         """Return A⁻¹ b."""
@@ -185,7 +200,9 @@ class PetscFactor:
             rows: owned rows that are asked for, all when None.
         """
         size = self._x.getLocalSize()
-        rows = np.arange(size) if rows is None else rows
+        if rows is None:
+            rows = np.arange(size)
+        # RIGHT_SIDES columns at a time, of which only the rows that are asked for are kept
         columns = np.zeros((len(rows), m))
         for first in range(0, m, RIGHT_SIDES):
             width = min(RIGHT_SIDES, m - first)
@@ -200,7 +217,7 @@ class PetscFactor:
         return columns
 
     def _solve_block(self, values: Array) -> Array:
-        """Solve for all columns at once, as MUMPS likes it."""
+        """Return A⁻¹ B of the owned rows (n, k) of B, solved at once: faster so with MUMPS."""
         shape = ((len(values), self._x.getSize()), (None, values.shape[1]))
         right, solved = (PETSc.Mat().createDense(shape, comm=self._x.comm) for _ in range(2))
         for matrix in (right, solved):
@@ -217,9 +234,9 @@ class PetscFactor:
 
 @contextmanager
 def _default_options(values: Mapping[str, object]) -> Iterator[None]:
-    """Set PETSc options of the factor that hold while it is made.
+    """Set PETSc options of the factor, for as long as it is made.
 
-    They do not where the user has given them: others may differ.
+    An option that the user has given keeps the user's value.
     """
     database = PETSc.Options(PREFIX)
     added = [name for name in values if not database.hasName(name)]
@@ -244,32 +261,33 @@ class PetscAlgebra:
         self.comm = MpiComm(comm)
 
     def combine(self, terms: Sequence[tuple[float, Matrix]]) -> Matrix:
-        """Return the sum of factor times matrix over the terms (factor, matrix)."""
+        """Return the sum of factor times matrix over the terms (factor, matrix). Collective."""
         total = None
         give_back(self.comm.mpi)
         for factor, matrix in terms:
+            # a matrix that is stored compactly makes ``mat`` anew, which may be overwritten here
             mat = as_petsc(matrix).mat
-            own = mat is as_petsc(matrix).stored
+            stored = mat is as_petsc(matrix).stored
             if total is None:
-                total = mat.copy() if own else mat
+                total = mat.copy() if stored else mat
                 total.scale(factor)
             else:
                 # M, C and K come from the same mesh and space: same sparsity unless a basis change
                 # dropped entries
                 total.axpy(factor, mat, structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
-                if not own:
+                if not stored:
                     mat.destroy()
         if total is None:
             raise ValueError("combine: give at least one term")
-        return self.held(total)
+        return self.store(total)
 
-    def held(self, mat: Any) -> PetscMatrix:
-        """Return a PETSc matrix that nobody else needs as this algebra stores it."""
+    def store(self, mat: Any) -> PetscMatrix:
+        """Return a PETSc matrix as this algebra stores it; nobody else may need ``mat``."""
         return PetscMatrix(mat)
 
     def congruence(self, T: Matrix, K: Matrix) -> Matrix:
         """Return Tᵀ K T."""
-        return self.held(triple_product(as_petsc(K).mat, as_petsc(T).mat))
+        return self.store(triple_product(as_petsc(K).mat, as_petsc(T).mat))
 
     def local(self, rows: Indices, columns: Indices, values: Array, n: int) -> Matrix:
         """Return the matrix of entries between the n unknowns of one rank.
@@ -296,9 +314,9 @@ class PetscAlgebra:
         chosen = PETSc.IS().createGeneral((start + rows).astype(PETSc.IntType), comm=mat.comm)
         whole = PETSc.IS().createStride(last - first, first, 1, comm=mat.comm)
         part = mat.createSubMatrix(chosen, whole)
-        found = rows_of(part)
+        entries = rows_of(part)
         part.destroy()
-        return found
+        return entries
 
     def replace_identity_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
         """Return the identity of n owned rows with some of them replaced.
@@ -336,11 +354,13 @@ class PetscAlgebra:
     def contact_last(self, A: Matrix, last: Indices) -> ContactLast | None:
         """Return a factor with these unknowns last, or None where there is none."""
         mat = as_petsc(A).mat
-        given = PETSc.Options(PREFIX).getAll()
-        # options of the user choose the factor
-        chosen = any(not name.startswith(TUNING) for name in given)
-        serves = not chosen and (self.comm.size == 1 or own_serves(mat))
-        return contact_last(self.comm, mat, last) if serves else None
+        # options of the user, but for those of tuning, choose PETSc's factor
+        options = PETSc.Options(PREFIX).getAll()
+        if any(not name.startswith(TUNING) for name in options):
+            return None
+        if self.comm.size > 1 and not own_serves(mat):
+            return None  # each rank would hold too large a copy
+        return contact_last(self.comm, mat, last)
 
     def dot(self, x: Array, y: Array) -> float:
         """Return x·y over all ranks."""
@@ -362,15 +382,15 @@ class UnsymmetricAlgebra(PetscAlgebra):
 
 
 def triple_product(K: Any, P: Any) -> Any:
-    """Return PᵀKP of PETSc matrices, a copy.
+    """Return PᵀKP of PETSc matrices. Collective.
 
-    What PETSc makes holds K and P for as long as it lives.
+    The product that PETSc makes holds K and P for as long as it lives; hence a copy is returned.
     """
     give_back(K.comm)
     product = K.PtAP(P)
-    made = product.duplicate(copy=True)
+    copy = product.duplicate(copy=True)
     product.destroy()
-    return made
+    return copy
 
 
 def as_petsc(matrix: Matrix) -> PetscMatrix:

@@ -12,10 +12,11 @@ def rows_of(mat: Any) -> sp.csr_matrix:
     return sp.csr_matrix((values, columns, ends), shape=(mat.getLocalSize()[0], mat.getSize()[1]))
 
 
-def moved(mat: Any, comm: Any) -> Any:
-    """Return a copy of a PETSc AIJ matrix on another communicator of the same ranks.
+def transfer(mat: Any, comm: Any) -> Any:
+    """Return an AIJ matrix on another communicator of the same ranks; ``mat`` is destroyed.
 
-    The matrix is destroyed.
+    Assembled matrices live on the communicator of their mesh, which ends with it; those of a system
+    have to outlive it (``mesh.communicators.keep_communicator``). Collective.
     """
     rows = rows_of(mat)
     columns = mat.getLocalSize()[1]
@@ -24,12 +25,10 @@ def moved(mat: Any, comm: Any) -> Any:
 
 
 def aij_of(rows: sp.spmatrix, comm: Any, columns: int | None = None) -> Any:
-    """Return the PETSc matrix with these rows of this rank. Collective.
-
-    Columns are numbered over all ranks.
+    """Return the PETSc AIJ matrix with these rows of this rank. Collective.
 
     Args:
-        rows: (n, unknowns of all ranks).
+        rows: (n, columns of all ranks) owned rows, columns numbered over all ranks.
         comm: the communicator.
         columns: how many of the columns this rank owns; n when None.
     """

@@ -12,7 +12,7 @@ from ...core.algebra import Array
 from ...core.checks import array, on_all, quote
 from ...core.errors import InputError
 from ...core.system import Load, SemiDiscreteSystem
-from ..mesh.communicators import MpiComm, kept
+from ..mesh.communicators import MpiComm, keep_communicator
 from .own_matrices import own_system
 from .petsc_algebra import PetscAlgebra, PetscMatrix, UnsymmetricAlgebra
 from .petsc_rows import aij_of, rows_of
@@ -55,7 +55,7 @@ def system_from_matrices(
         InputError: matrices of another type, layout or communicator; what ``system_from_arrays``
             refuses.
     """
-    given = {
+    arguments = {
         "coordinates": coordinates,
         "unknowns": unknowns,
         "clamped": clamped,
@@ -68,18 +68,26 @@ def system_from_matrices(
             f"{OWNER}: K is {quote(K)}; give a PETSc.Mat, or scipy matrices to "
             "vc.system_from_arrays"
         )
-    comm = kept(K.comm.tompi4py())
-    named = [("M", M), ("K", K)] + ([] if C is None else [("C", C)])
-    rows = on_all(MpiComm(comm), OWNER, lambda: {name: _rows(name, A, K) for name, A in named})
-    matrices = {name: PetscMatrix(aij_of(one, comm)) for name, one in rows.items()}
+    comm = keep_communicator(K.comm.tompi4py())
+    named = {"M": M, "K": K}
+    if C is not None:
+        named["C"] = C
+
+    # copies on a communicator that lasts; on one rank a matrix may be wrong, and all ranks raise
+    rows = on_all(
+        MpiComm(comm), OWNER, lambda: {name: _copy_rows(name, A, K) for name, A in named.items()}
+    )
+    matrices = {name: PetscMatrix(aij_of(own, comm)) for name, own in rows.items()}
+
+    # of a function space, the points of the owned nodes
     if hasattr(coordinates, "tabulate_dof_coordinates"):
         count = coordinates.dofmap.index_map.size_local
         d = coordinates.mesh.geometry.dim
-        given["coordinates"] = coordinates.tabulate_dof_coordinates()[:count, :d]
-    return own_system(OWNER, PetscAlgebra(comm), UnsymmetricAlgebra(comm), matrices, given)
+        arguments["coordinates"] = coordinates.tabulate_dof_coordinates()[:count, :d]
+    return own_system(OWNER, PetscAlgebra(comm), UnsymmetricAlgebra(comm), matrices, arguments)
 
 
-def _rows(name: str, A: Any, K: Any) -> sp.csr_matrix:
+def _copy_rows(name: str, A: Any, K: Any) -> sp.csr_matrix:
     """Return a copy of this rank's rows of a matrix with the layout of K.
 
     Args:
@@ -96,22 +104,22 @@ def _rows(name: str, A: Any, K: Any) -> sp.csr_matrix:
     if name == "M" and not isinstance(A, PETSc.Mat):
         masses = array(OWNER, name, A.array_r if isinstance(A, PETSc.Vec) else A, (n,), unit="kg")
         return sp.csr_matrix((masses, (np.arange(n), first + np.arange(n))), shape=(n, columns))
-    said = ""
+    defect = ""
     if not isinstance(A, PETSc.Mat):
-        said = f"is {quote(A)}; give a PETSc.Mat"
+        defect = f"is {quote(A)}; give a PETSc.Mat"
     elif A.getType() not in ("seqaij", "mpiaij"):
-        said = f"is of type {A.getType()}; give AIJ, A.convert('aij')"
+        defect = f"is of type {A.getType()}; give AIJ, A.convert('aij')"
     elif not A.isAssembled():
-        said = "is not assembled; call its assemble()"
+        defect = "is not assembled; call its assemble()"
     elif MPI.Comm.Compare(A.comm.tompi4py(), K.comm.tompi4py()) not in (MPI.IDENT, MPI.CONGRUENT):
-        said = "and K are on different communicators; make them on one"
+        defect = "and K are on different communicators; make them on one"
     elif A.getLocalSize() != (n, n):
-        said = (
+        defect = (
             f"has {A.getLocalSize()} rows and columns on this rank and K {n} rows; give square "
             "ones of one layout"
         )
     elif np.dtype(PETSc.ScalarType).kind == "c":
-        said = "is complex, as all matrices of this PETSc; use one with real numbers"
-    if said:
-        raise InputError(f"{OWNER}: {name} {said}")
+        defect = "is complex, as all matrices of this PETSc; use one with real numbers"
+    if defect:
+        raise InputError(f"{OWNER}: {name} {defect}")
     return rows_of(A)

@@ -1,7 +1,4 @@
-"""Offer collective operations and communicators that last.
-
-What frees PETSc objects that wait on them is here too.
-"""
+"""Offer collective operations on MPI, communicators that last, and the end of PETSc's objects."""
 
 from typing import Any
 
@@ -14,7 +11,7 @@ from ...core.timing import release_memory
 
 
 class MpiComm:
-    """Offer the collective operations on an MPI communicator."""
+    """Offer the operations of ``core.algebra.Comm`` on an MPI communicator, ``mpi``."""
 
     def __init__(self, comm: Any) -> None:
         self.mpi = comm
@@ -22,6 +19,7 @@ class MpiComm:
         self.size: int = comm.size
 
     def _reduce(self, x: Array, operation: Any) -> Array:
+        """Return x reduced over the ranks, entry by entry, the same on every rank."""
         if self.size == 1:
             return x
         total = np.empty_like(x)
@@ -45,23 +43,21 @@ class MpiComm:
         return self.mpi.gather(value, root=0)
 
 
-def kept(comm: Any) -> Any:
-    """Return the communicator of the ranks of ``comm`` that lasts as long as the program.
+def keep_communicator(comm: Any) -> Any:
+    """Return a communicator of the same ranks that lasts as long as the program.
 
-    Collective the first time.
-
-    PETSc objects that Python drops wait on their communicator for ``give_back``. A mesh frees its
-    own at its end: what waits there would wait for ever.
+    Collective the first time. PETSc objects that Python drops wait on their communicator for
+    ``give_back``. A mesh frees its own at its end: what waits there would wait for ever.
     """
-    alike = (MPI.IDENT, MPI.CONGRUENT)
-    found = next((one for one in _KEPT if MPI.Comm.Compare(one, comm) in alike), None)
-    if found is None:
-        found = comm.Dup()
-        _KEPT.append(found)
-    return found
+    for lasting in _LASTING:
+        if MPI.Comm.Compare(lasting, comm) in (MPI.IDENT, MPI.CONGRUENT):
+            return lasting
+    lasting = comm.Dup()
+    _LASTING.append(lasting)
+    return lasting
 
 
-_KEPT: list[Any] = []
+_LASTING: list[Any] = []
 
 
 def give_back(comm: Any) -> None:

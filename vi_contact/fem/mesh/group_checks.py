@@ -1,6 +1,4 @@
-"""Check groups of facets and cells where they are given.
-
-They must be of the right kind, and of the mesh they are used on.
+"""Check groups of facets and cells where they are given: their kind, and the mesh they are of.
 
 Their numbers are local ones of one mesh. On another mesh, or taken for those of cells, they would
 name other places.
@@ -83,7 +81,7 @@ def _group(owner: str, meaning: str, group: Any, mesh: Mesh | None, wanted: type
     )
 
 
-def field_given(owner: str, meaning: str, value: Any) -> None:
+def check_field(owner: str, meaning: str, value: Any) -> None:
     """Raise InputError unless it is a function or a vector of numbers.
 
     Size and NaN are told where it is used.
@@ -96,11 +94,10 @@ def field_given(owner: str, meaning: str, value: Any) -> None:
     if callable(value):
         function(owner, meaning, value, "give numbers, one per dimension, or a function")
         return
-    for one in several(
-        owner, meaning, value, "give numbers, one per dimension, or a function of points and time"
-    ):
-        if not isinstance(one, float):  # NaN too
-            array(owner, f"a component of {meaning}", one, ())
+    remedy = "give numbers, one per dimension, or a function of points and time"
+    for component in several(owner, meaning, value, remedy):
+        if not isinstance(component, float):  # NaN too
+            array(owner, f"a component of {meaning}", component, ())
 
 
 def components_of(meaning: str, given: tuple[int, ...] | None, dimension: int) -> tuple[int, ...]:
@@ -122,14 +119,12 @@ def components_of(meaning: str, given: tuple[int, ...] | None, dimension: int) -
     return tuple(range(dimension) if given is None else given)
 
 
-def components_given(owner: str, value: Any) -> None:
+def check_components(owner: str, value: Any) -> None:
     """Raise InputError unless it is None or a tuple of whole numbers.
 
     Their range is told where they are used.
     """
-    for one in (
-        ()
-        if value is None
-        else several(owner, "components", value, "give a tuple, such as (0,), or None")
-    ):
-        whole(owner, "a component", one)
+    if value is None:
+        return
+    for component in several(owner, "components", value, "give a tuple, such as (0,), or None"):
+        whole(owner, "a component", component)

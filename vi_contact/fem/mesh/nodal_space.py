@@ -1,6 +1,8 @@
-"""Say what unknowns mean that are displacements of nodes.
+"""Say what unknowns mean that are displacements of nodes: where these are, and on which rank.
 
-This is where the nodes are, which rank has them, what is a body.
+``NodalSpace`` is what contact and output need of finite elements (``body.space``) and of own
+matrices (``matrices.own_matrices``) alike. ``parts_of`` finds bodies, and other things that hang
+together over ranks.
 """
 
 from typing import Any
@@ -12,9 +14,8 @@ from ...core.checks import describe_point
 from ...core.errors import InputError
 from ...meshes.rows import number_parts
 
-MEANT = (
-    0.05  # of the size of a body: how far from it a point may be that stands for the nearest node
-)
+# of the size of a body: how far from it a point may be that stands for the nearest node
+MEANT = 0.05
 
 
 class NodalSpace:
@@ -33,7 +34,7 @@ class NodalSpace:
         numbers: (k, d) the same among those of all ranks, also of a component that follows another.
         held: (k, d) components that are given.
         ids: (n,) numbers of the owned unknowns on any ranks (node * d + component).
-        unknowns: how many on all ranks.
+        unknowns: how many unknowns there are on all ranks.
     """
 
     algebra: Algebra
@@ -50,16 +51,11 @@ class NodalSpace:
 
     @property
     def hierarchy(self) -> Any:
-        """Return the change to unknowns of a hierarchy, where contact conditions need one.
-
-        It is None elsewhere.
-        """
+        """Return the change to unknowns of a hierarchy (``body.hierarchical``), or None."""
         return None
 
     def expand(self, u: Array, t: float, derivative: int = 0) -> Array:
-        """Expand a vector of unknowns (n,) at time t to displacements of owned nodes (k, d).
-
-        Or to the derivatives of these.
+        """Return the displacements of owned nodes (k, d), or their rates, of a vector of unknowns.
 
         Args:
             u: (n,) vector of unknowns.
@@ -70,14 +66,11 @@ class NodalSpace:
         return np.where(where >= 0, u.take(where, mode="clip") if len(u) else 0.0, 0.0)
 
     def leaders(self, nodes: Indices) -> Indices:
-        """Return these node numbers, of nodes that follow another that of the other.
-
-        It is -1 for those tied in part.
-        """
+        """Return the numbers of the nodes that these follow: their own, where nothing is tied."""
         return nodes
 
     def blocks_of(self, nodes: Indices) -> Indices:
-        """Return the owned block of each node number, -1 when another rank owns it."""
+        """Return the place (k,) of each node number among the owned nodes, -1 of other ranks'."""
         if not len(self.nodes):
             return np.full(len(nodes), -1)
         order = np.argsort(self.nodes)
@@ -85,14 +78,20 @@ class NodalSpace:
         return np.where(self.nodes[blocks] == nodes, blocks, -1)
 
     def at_nodes(self, numbers: Indices, values: Array) -> Array:
-        """Return owned nodal values (k, c) at node numbers, on every rank. Collective.
+        """Return values at nodes of any rank, on every rank; zero at nodes of nobody. Collective.
 
-        They are zero for nodes of nobody.
+        Args:
+            numbers: (m,) numbers of nodes, the same on every rank.
+            values: (k, c) at the owned nodes.
+
+        Returns:
+            (m, c).
         """
-        found = np.zeros((len(numbers), values.shape[1]))
+        # each node has one owner: all others add zeros
+        rows = np.zeros((len(numbers), values.shape[1]))
         where = self.blocks_of(numbers)
-        found[where >= 0] = values[where[where >= 0]]
-        return self.comm.sum(found)
+        rows[where >= 0] = values[where[where >= 0]]
+        return self.comm.sum(rows)
 
     def sample(self, u: Array, nodes: Indices, t: float, derivative: int = 0) -> Array:
         """Return the displacements (k, d) at node numbers, equal on all ranks. Collective.
@@ -106,14 +105,18 @@ class NodalSpace:
         return self.at_nodes(nodes, self.expand(u, t, derivative))
 
     def find_nodes(self, points: Array) -> Indices:
-        """Find the numbers of the nodes nearest to the points (k, d), equal on all ranks.
+        """Find the nodes nearest to points; of several the one of least number. Collective.
 
-        Collective.
+        Args:
+            points: (k, d) [m].
 
-        InputError for a point farther from every node than the body is large (5 % of its
-        diagonal).
+        Returns:
+            (k,) numbers of nodes, the same on all ranks.
+
+        Raises:
+            InputError: a point farther from every node than 5 % of the diagonal of the body.
         """
-        found = np.empty(len(points), dtype=np.int64)
+        numbers = np.empty(len(points), dtype=np.int64)
         for i, point in enumerate(np.atleast_2d(np.asarray(points, dtype=float))):
             if point.shape != (self.dimension,):
                 raise InputError(
@@ -127,10 +130,9 @@ class NodalSpace:
                     "give a point of the body"
                 )
             close = self.nodes[distance <= nearest + 1e-9 * self.size]
-            found[i] = -int(
-                largest(self.comm, -float(np.min(close, initial=np.iinfo(np.int64).max)))
-            )
-        return found
+            least = float(np.min(close, initial=np.iinfo(np.int64).max))
+            numbers[i] = -int(largest(self.comm, -least))
+        return numbers
 
 
 def bounding_box(comm: Comm, points: Array) -> float:
@@ -141,21 +143,25 @@ def bounding_box(comm: Comm, points: Array) -> float:
 
 
 def parts_of(comm: Comm, first: Any, second: Any, numbers: Indices, shared: Indices) -> Indices:
-    """Return the part that each of the numbers (n,) of this rank belongs to. Collective.
+    """Return which part of a graph over all ranks each thing of this rank belongs to. Collective.
 
-    Parts are 0, 1, ..., in the order of least numbers. Links join things of this rank; where ranks
-    have one thing, parts of different ranks meet and are one.
+    A thing has one number on all ranks. Links join things of one rank; where several ranks have a
+    thing, their parts meet there and are one.
 
     Args:
         comm: the ranks.
-        first: places of things, one end of each link.
+        first: places of things among ``numbers``, one end of each link.
         second: places of the other ends.
         numbers: (n,) of the things of this rank.
         shared: places of things that other ranks have too.
+
+    Returns:
+        (n,) parts 0, 1, …, in the order of their least numbers.
     """
     # parts of this rank, each called by its smallest number
     part = _smallest(first, second, numbers)
-    # what things that several ranks have are called there: these parts are one
+    # rows (thing, what its part is called on a rank) of shared things: sorted by things, neighbours
+    # with one thing are two names of one part
     meeting = np.column_stack([numbers[shared], part[shared]])
     meeting = np.unique(np.concatenate(from_each(comm, meeting)), axis=0)
     parts = np.unique(np.concatenate(from_each(comm, np.unique(part))))

@@ -83,9 +83,11 @@ def supports(V: Any) -> list[list[int]]:
     """
     dim = V.mesh.topology.dim
     count = V.dofmap.dof_layout.num_dofs
-    return [vertices for one in range(dim + 1) for vertices in compat.sub_entities(V.mesh, one)][
-        :count
-    ]
+    # vertices, edges, sides and the cell; a space of degree 1 has nodes at the first of them only
+    entities: list[list[int]] = []
+    for entity_dim in range(dim + 1):
+        entities += compat.sub_entities(V.mesh, entity_dim)
+    return entities[:count]
 
 
 def number_nodes(V: Any) -> NodeTable:
@@ -166,13 +168,14 @@ def _with_mid_points(
     local = V.dofmap.index_map
     numbers = np.full(local.size_local + local.num_ghosts, -1, dtype=np.int64)
     points = np.zeros((len(numbers), mesh.geometry.dim))
-    first = count = 1 + mesh.comm.allreduce(int(names.max(initial=-1)), op=MPI.MAX)
+    count = 1 + mesh.comm.allreduce(int(names.max(initial=-1)), op=MPI.MAX)
+    first = count  # number of the next kind of node
     # nodes between one vertex (itself), two, four or eight, in this order
     for width in sorted({len(vertices) for vertices in around}):
         places = np.array([k for k, vertices in enumerate(around) if len(vertices) == width])
         # one cell of each node, and the place of the node in it
-        known, found = np.unique(blocks[:, places], return_index=True)
-        cell, place = np.divmod(found, len(places))
+        known, first_at = np.unique(blocks[:, places], return_index=True)
+        cell, place = np.divmod(first_at, len(places))
         vertices = corners[cell[:, None], np.array([around[p] for p in places])[place]]
         # the mean of vertices in ascending numbers is the same on every rank, to the last digit
         vertices = np.take_along_axis(vertices, np.argsort(names[vertices], axis=1), axis=1)

@@ -37,7 +37,14 @@ _NOWHERE = (np.zeros(0, dtype=np.int32), np.zeros(1, dtype=np.int32))  # destina
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Name a part of a mesh by local numbers; each is kept once, ascending."""
+    """Name a part of a mesh by local numbers; each is kept once, ascending.
+
+    Attributes:
+        name: that of the group.
+        indices: local numbers of cells or facets, those of ghosts too.
+        mesh: the mesh that they belong to.
+        codimension: 0 of cells, 1 of facets.
+    """
 
     name: str
     indices: Indices
@@ -73,14 +80,15 @@ class Group:
 
         Collective.
 
-        InputError, on all ranks, for tags of another mesh or dimension and for a value that none of
-        any rank has.
-
         Args:
             name: that of the group.
             meshtags: DOLFINx MeshTags of the mesh.
             value: which of their values.
             mesh: the mesh.
+
+        Raises:
+            InputError: on all ranks, tags of another mesh or dimension, and a value that none of
+                any rank has.
         """
         owner = f"{cls.__name__}.tagged"
         things = cls.__name__.lower()
@@ -88,9 +96,8 @@ class Group:
         provides(owner, "meshtags", meshtags, ("dim", "indices", "values"), "give DOLFINx MeshTags")
         dim = mesh.topology.dim - cls.codimension
         values = np.asarray(meshtags.values)
-        chosen = np.asarray(meshtags.indices)[
-            values == whole(owner, "value", value, least=-(2**31))
-        ]
+        tagged = values == whole(owner, "value", value, least=-(2**31))
+        chosen = np.asarray(meshtags.indices)[tagged]
         defect = ""
         if not compat.tags_of(meshtags, mesh):
             defect = (
@@ -103,13 +110,13 @@ class Group:
             )
         refuse([defect], MpiComm(mesh.comm))
         if not mesh.comm.allreduce(len(chosen)):
-            found = np.unique(np.concatenate(mesh.comm.allgather(np.unique(values))))
-            there = ", ".join(map(str, found[:MOST_NAMED])) + (
-                ", …" if len(found) > MOST_NAMED else ""
-            )
+            known = np.unique(np.concatenate(mesh.comm.allgather(np.unique(values))))
+            listing = ", ".join(map(str, known[:MOST_NAMED]))
+            if len(known) > MOST_NAMED:
+                listing += ", …"
             raise InputError(
                 f"{owner}: no {things} have the value {value} of '{name}'; give one of "
-                f"{there or 'none'}"
+                f"{listing or 'none'}"
             )
         return cls(name, chosen, mesh)
 
@@ -119,12 +126,13 @@ class Group:
 
         Their vertices are all marked.
 
-        InputError, on all ranks, when the marker fails or marks none on any rank.
-
         Args:
             name: that of the group.
             mesh: the mesh.
             marker: x (3, n) [m] -> (n,) truth values, as in DOLFINx.
+
+        Raises:
+            InputError: on all ranks, a marker that fails, or marks none on any rank.
         """
         owner = f"{cls.__name__}.where"
         things = cls.__name__.lower()
@@ -132,7 +140,8 @@ class Group:
         instance(owner, "mesh", mesh, Mesh, "give a DOLFINx mesh")
         function(owner, "marker", marker, "give a function of x (3, n) that returns n truth values")
 
-        def safe(x: Any) -> Any:  # the other ranks must not wait where it raises
+        # the other ranks must not wait where the marker raises: its error is told afterwards
+        def mark_safely(x: Any) -> Any:
             try:
                 if x.shape[1]:
                     return mask(
@@ -142,12 +151,12 @@ class Group:
                 defects.append(explain_error(f"{owner}: the marker of '{name}'", error))
             return np.zeros(x.shape[1], dtype=bool)
 
-        chosen = compat.entities_where(mesh, mesh.topology.dim - cls.codimension, safe)
+        chosen = compat.entities_where(mesh, mesh.topology.dim - cls.codimension, mark_safely)
         refuse(defects, MpiComm(mesh.comm))
         if not mesh.comm.allreduce(len(chosen)):
-            of = "facets of the boundary" if cls.codimension else "cells"
+            candidates = "facets of the boundary" if cls.codimension else "cells"
             raise InputError(
-                f"{owner}: the marker of '{name}' marks no {of}; mark all vertices of some "
+                f"{owner}: the marker of '{name}' marks no {candidates}; mark all vertices of some "
                 f"{things}, coordinates compared with np.isclose"
             )
         return cls(name, chosen, mesh)
@@ -247,21 +256,24 @@ def build_mesh(mesh: MeshScript, comm: MPI.Comm) -> tuple[Mesh, Tags]:
 def _distribute(comm: MPI.Comm, produce: Callable[[], MeshArrays]) -> tuple[Mesh, Tags]:
     """Return the mesh that rank 0 produces, distributed, and its groups. Collective.
 
-    ``produce``: returns points, cells and groups; what it raises, all ranks raise.
+    Args:
+        comm: the ranks.
+        produce: returns points, cells and groups, on rank 0; what it raises, all ranks raise.
     """
     instance("mesh", "comm", comm, MPI.Comm, "give a communicator, such as MPI.COMM_WORLD")
-    arrays = on_root(MpiComm(comm), produce)  # what rank 0 raises, all ranks raise
+    # rank 0 has points and cells, the others none; all have the groups
+    arrays = on_root(MpiComm(comm), produce)
     groups = comm.bcast(
         arrays and replace(arrays, points=arrays.points[:0], cells=arrays.cells[:0])
     )
-    arrays = arrays or groups  # without points and cells on the others
+    arrays = arrays or groups
     cells = arrays.cells[:, compat.gmsh_order(arrays.cell, arrays.cells.shape[1])]
-    where = (
-        destinations(arrays.points, arrays.cells, arrays.cell, comm.size)
-        if comm.rank == 0
-        else _NOWHERE
-    )
+    where = _NOWHERE
+    if comm.rank == 0:
+        where = destinations(arrays.points, arrays.cells, arrays.cell, comm.size)
     mesh = compat.create_mesh(comm, arrays.cell, cells, arrays.points, where)
+
+    # groups of cells by the numbers of the input, groups of facets by those of their vertices
     tags = Tags()
     original = np.asarray(mesh.topology.original_cell_index, dtype=np.int64)
     for name, members in arrays.cell_groups.items():

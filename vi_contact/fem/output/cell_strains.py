@@ -17,10 +17,14 @@ class CellStrains:
     """
 
     def __init__(self, space: FemSpace) -> None:
-        V, d = space.V, space.dimension
+        """Assemble ∫ eps(phi_j) over each cell, and the volumes of the cells. Collective."""
+        V = space.V
+        d = space.dimension
         self._components = d * d
+        # tested with tensors that are constant on a cell, the strains are integrated cell by cell
         tensors = compat.lagrange(V.mesh, 0, (d, d), continuous=False)
-        q, eps = ufl.TestFunction(tensors), ufl.sym(ufl.grad(ufl.TrialFunction(V)))
+        q = ufl.TestFunction(tensors)
+        eps = ufl.sym(ufl.grad(ufl.TrialFunction(V)))
         form = compat.compile_form(ufl.inner(q, eps) * ufl.dx)
         self._integrals = PetscMatrix(compat.assemble_matrix(form))
         volumes = compat.assemble_vector(compat.compile_form(q[0, 0] * ufl.dx)).array_r
@@ -33,9 +37,10 @@ class CellStrains:
         return len(self._volumes)
 
     def mean(self, u: Array) -> Array:
-        """Return mean strains (owned cells, d²), row by row, of nodal displacements. Collective.
+        """Return mean strains (owned cells, d²), the rows of each tensor in turn. Collective.
 
-        The displacements (nodes d,) [m] are those of ``FemSpace.expand``, as one row.
+        Args:
+            u: (owned nodes d,) displacements as ``FemSpace.expand`` gives them, flattened [m].
         """
         integrals = (self._integrals @ u).reshape(len(self), self._components)
         return np.asarray((integrals / self._volumes)[self._order])

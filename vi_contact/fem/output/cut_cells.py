@@ -1,10 +1,11 @@
-"""Integrate over what lies on one side of a plane that goes through cells.
+"""Integrate over the parts of cells, or of their facets, on one side of a plane that cuts them.
 
-These are parts of these cells and of their facets.
+Cells are divided into simplices, a quadrilateral into the 2 triangles and a hexahedron into the 6
+tetrahedra round a diagonal. The plane cuts each simplex into smaller ones. Nodal values are taken
+for linear in a simplex, which is exact for linear fields on cells with parallel sides.
 
-They are cut as simplices, a quadrilateral as the 2 triangles and a hexahedron as the 6 tetrahedra
-round a diagonal, in which nodal values are taken for linear: exact for linear fields on cells with
-parallel sides.
+A corner of a simplex is stored as the shares that the vertices of its cell have in it, so that
+every nodal field is interpolated there by one product.
 """
 
 from collections.abc import Callable
@@ -29,65 +30,87 @@ def work_beyond(
     density: Array | float,
     load: Traction | BodyForce | None,
 ) -> Array:
-    """Return (motions, owned components) ∫ density motion·phi_i over parts of cells.
+    """Integrate density motion·phi_i over the parts of crossed cells where level <= 0. Collective.
 
-    Or it is over parts of the facets of a traction.
-
-    They are the parts of crossed cells where the level is not positive. Collective.
+    With a traction it is integrated over the parts of its facets that lie there. Products with
+    nodal values f_i give the work ∫ density motion·f of a field f on each motion.
 
     Args:
         space: the body's unknowns.
-        crossed: mask of local cells that count.
+        crossed: (local cells,) which cells count.
         level: points (…, d) -> (…), not positive in the parts that count.
         motion: points (k, d) -> virtual displacements (motions, k, d), linear in them.
-        density: a number, or one of each local cell.
+        density: a number, or (local cells,).
         load: a traction or body force, None for ``density`` alone.
+
+    Returns:
+        (motions, owned nodes d) the integrals for the components of the owned nodes.
     """
+    # the simplices on this side, and their corners as points (p, n, d)
     d = space.dimension
-    cells, nodes = _entities(
+    surface = isinstance(load, Traction)
+    cells, nodes = _list_entities(
         space.mesh, crossed, load.facets.indices if isinstance(load, Traction) else None
     )
     whole = space.mesh.geometry.x[nodes][:, :, :d]
-    corners, owner = parts(simplices(nodes.shape[1], d - isinstance(load, Traction)), level(whole))
-    at = np.matmul(corners, whole[owner])
-    edges = at[:, 1:] - at[:, :1]
-    r = motion(at.reshape(-1, d))
-    r = r.reshape(len(r), *at.shape)
+    divided = simplices(nodes.shape[1], d - 1 if surface else d)
+    corners, owner = parts(divided, level(whole))
+    points = np.matmul(corners, whole[owner])
+    edges = points[:, 1:] - points[:, :1]
+
+    # the motions r (motions, p, n, d) there, or what of them the load works on: the part along the
+    # facet, or the part against its normal, which meets a pressure p as first component of a field
+    r = motion(points.reshape(-1, d))
+    r = r.reshape(len(r), *points.shape)
     if isinstance(load, TangentialTraction):
         r = r @ (np.linalg.pinv(edges) @ edges)
-    if isinstance(load, Pressure):  # which is the first component of its field
-        centres = space.mesh.geometry.x[compat.geometry_dofmap(space.mesh)[cells]].mean(axis=1)[
-            owner, None, :d
-        ]
-        sides = np.diff(whole, axis=1)[owner]
-        away = whole[owner, :1] - centres
-        outward = away - away @ np.linalg.pinv(sides) @ sides
-        r = (
-            -(r @ (outward / np.linalg.norm(outward, axis=2, keepdims=True)).swapaxes(1, 2))
-            * np.eye(d)[0]
-        )
+    if isinstance(load, Pressure):
+        normals = _outward(space.mesh, cells[owner], whole[owner])
+        r = -(r @ normals.swapaxes(1, 2)) * np.eye(d)[0]
+
     # ∫ f g over a simplex of n corners: (Σf Σg + Σ f g) of its size / (n (n + 1))
     n = corners.shape[1]
     size = np.sqrt(np.abs(np.linalg.det(edges @ edges.swapaxes(1, 2)))) / factorial(n + 1)
     size = size * np.broadcast_to(density, len(crossed))[cells[owner]]
     shares = np.einsum("p,pnv,jpmd,nm->pvjd", size, corners, r, 1.0 + np.eye(n), optimize=True)
-    found = np.zeros((len(space.nodes), len(r), d))
+
+    # summed at the nodes, which other ranks may own
+    sums = np.zeros((len(space.nodes), len(r), d))
     for numbers, values in from_each(
         space.comm, (node_numbers(space.mesh)[nodes[owner]].ravel(), shares)
     ):
         own = space.blocks_of(numbers)
-        np.add.at(found, own[own >= 0], values.reshape(-1, len(r), d)[own >= 0])
-    return found.swapaxes(0, 1).reshape(len(r), -1)
+        np.add.at(sums, own[own >= 0], values.reshape(-1, len(r), d)[own >= 0])
+    return sums.swapaxes(0, 1).reshape(len(r), -1)
 
 
-def _entities(mesh: Any, crossed: Mask, facets: Any) -> tuple[Any, Any]:
-    """Return (cells, geometry nodes) of the crossed cells of this rank.
+def _outward(mesh: Any, cells: Any, corners: Array) -> Array:
+    """Return the outward unit normals (k, 1, d) of facets.
 
-    Or the nodes are those of the outer facets beside them.
+    A normal is what is left of the way from the middle of the cell to the facet without its part
+    along the facet.
 
     Args:
         mesh: the mesh.
-        crossed: mask of local cells.
+        cells: (k,) the local cell beside each facet.
+        corners: (k, v, d) the vertices of the facets [m].
+    """
+    d = corners.shape[2]
+    centres = mesh.geometry.x[compat.geometry_dofmap(mesh)[cells]].mean(axis=1)[:, None, :d]
+    sides = np.diff(corners, axis=1)
+    away = corners[:, :1] - centres
+    outward = away - away @ np.linalg.pinv(sides) @ sides
+    return np.asarray(outward / np.linalg.norm(outward, axis=2, keepdims=True))
+
+
+def _list_entities(mesh: Any, crossed: Mask, facets: Any) -> tuple[Any, Any]:
+    """Return the crossed cells (k,) that this rank owns, and their geometry nodes (k, v).
+
+    With facets, these are the cells beside outer facets, and the nodes of the facets.
+
+    Args:
+        mesh: the mesh.
+        crossed: (local cells,) mask.
         facets: local facets of a traction, or None for cells.
     """
     dim = mesh.topology.dim
@@ -98,34 +121,52 @@ def _entities(mesh: Any, crossed: Mask, facets: Any) -> tuple[Any, Any]:
     facets = facets[facets < owned(dim - 1).size_local]
     beside = mesh.topology.connectivity(dim - 1, dim)  # made with the measure of the traction
     cells = beside.array[beside.offsets[:-1][facets]]
-    kept = (np.diff(beside.offsets)[facets] == 1) & crossed[cells]
-    return cells[kept], compat.entities_to_geometry(mesh, dim - 1, facets[kept])
+    # a facet between two cells is no outer one
+    chosen = (np.diff(beside.offsets)[facets] == 1) & crossed[cells]
+    return cells[chosen], compat.entities_to_geometry(mesh, dim - 1, facets[chosen])
 
 
 def simplices(vertices: int, dimension: int) -> Array:
-    """Return (k, n, vertices) shares of the vertices in the corners of simplices.
+    """Return the k simplices of n corners that make up a cell.
 
-    These simplices make up a cell.
+    Args:
+        vertices: how many the cell has.
+        dimension: that of the cell.
+
+    Returns:
+        (k, n, vertices) shares of the vertices of the cell in the corners of the simplices.
     """
-    paths = [range(vertices)]
-    if vertices > dimension + 1:  # from the first vertex to the last along the axes, in every order
-        paths = [
-            np.cumsum([0, *(2**axis for axis in order)]) for order in permutations(range(dimension))
-        ]
-    return np.array([np.eye(vertices)[list(path)] for path in paths])
+    if vertices == dimension + 1:
+        paths = [list(range(vertices))]
+    else:
+        # each order of the axes is a way along edges from the first vertex to the last, and the
+        # vertices on it are those of one simplex; vertex numbers are sums of 2**axis
+        paths = []
+        for order in permutations(range(dimension)):
+            steps = [2**axis for axis in order]
+            paths.append(np.cumsum([0, *steps]).tolist())
+    return np.array([np.eye(vertices)[path] for path in paths])
 
 
 def parts(whole: Array, level: Array) -> tuple[Array, Indices]:
-    """Return (shares of the vertices in corners (p, n, v), entity (p,)) of simplices.
+    """Return the parts of simplices where a level that is linear in them is not positive.
 
-    They are what of the simplices ``whole`` (k, n, v) of each entity lies where the level of its
-    vertices (entities, v), linear in them, is not positive.
+    A simplex with corners on both sides is divided at the point of level 0 on the edge from its
+    lowest corner to its highest one: this point takes the place of the highest corner in one half,
+    and of the lowest in the other. Each half has one corner less on one of the sides, so that after
+    n - 1 rounds no simplex of n corners has corners on both.
+
+    Args:
+        whole: (k, n, v) the simplices that make up each entity, as shares of its vertices.
+        level: (entities, v) at the vertices.
+
+    Returns:
+        (p, n, v) shares of the vertices in the corners of the parts, and (p,) the entity of each.
     """
     owner = np.repeat(np.arange(len(level)), len(whole))
     corners = np.tile(whole, (len(level), 1, 1))
-    # their level as last share
+    # the level of a corner is stored beside its shares, as the last one
     corners = np.concatenate([corners, corners @ level[owner][:, :, None]], axis=2)
-    # a cut edge leaves one corner less on the wrong side in both halves
     for _ in range(whole.shape[1] - 1):
         low = corners[:, :, -1].argmin(axis=1)
         high = corners[:, :, -1].argmax(axis=1)
@@ -137,9 +178,10 @@ def parts(whole: Array, level: Array) -> tuple[Array, Indices]:
         above = above[cut]
         rest = corners[cut]
         middle = (above[:, -1:] * below - below[:, -1:] * above) / (above - below)[:, -1:]
-        middle[:, -1] = 0.0
-        corners[cut, high[cut]] = rest[np.arange(len(cut)), low[cut]] = middle
+        middle[:, -1] = 0.0  # without round-off
+        corners[cut, high[cut]] = middle
+        rest[np.arange(len(cut)), low[cut]] = middle
         corners = np.concatenate([corners, rest])
         owner = np.concatenate([owner, owner[cut]])
-    kept = (corners[:, :, -1] <= 0.0).all(axis=1)
-    return corners[kept, :, :-1], owner[kept]
+    inside = (corners[:, :, -1] <= 0.0).all(axis=1)
+    return corners[inside, :, :-1], owner[inside]

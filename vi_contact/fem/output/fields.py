@@ -1,10 +1,8 @@
-"""Write fields for ParaView.
+"""Write fields for ParaView: ``fields.xdmf`` and HDF5 files of one frame or several.
 
-They are ``fields.xdmf`` and HDF5 files of one frame or several, in the order of the input mesh.
-
-Every file is replaced as a whole and the index names only frames that are complete, so that
-ParaView can open it at any moment, also while the run goes on or after it was killed. Nothing in
-the files depends on the number of ranks.
+Nodes and cells are in the order of the input mesh. Every file is replaced as a whole and the index
+names only frames that are complete, so that ParaView can open it at any moment, also while the run
+goes on or after it was killed. Nothing in the files depends on the number of ranks.
 
 What a frame holds: docs/reference/files.md. In the first one a is zero, and with friction all
 closed nodes stick.
@@ -46,16 +44,15 @@ log = logging.getLogger(__name__)
 class VonMises:
     """Compute the mean von Mises stress of owned cells [Pa].
 
-    It is ∫ sqrt(3/2 s:s) / ∫ 1 over a cell, s = dev(sigma).
-
-    Plane strain has sigma_zz = lambda tr(eps), plane stress none, a bar uniaxial stress. Without
-    viscous stresses.
+    It is ∫ sqrt(3/2 s:s) / ∫ 1 over a cell, s = dev(sigma). Plane strain has sigma_zz = lambda
+    tr(eps), plane stress none, a bar uniaxial stress. Viscous stresses are left out.
     """
 
     def __init__(self, forms: Any) -> None:
-        """Take ``forms``, the ElasticForms of a system.
+        """Compile the form. Collective.
 
-        Their constants carry the thickness as a factor.
+        Args:
+            forms: the ElasticForms of a system.
         """
         import ufl  # late, as compat: frames of own matrices need no DOLFINx
 
@@ -64,9 +61,12 @@ class VonMises:
 
         space = forms.space
         self._forms = forms
-        self._assembled = compat.assemble_vector
+        self._assemble = compat.assemble_vector
         self._u = compat.function(space.V)
-        sigma, across = (one / forms.section.thickness for one in forms.stresses(self._u))
+        # the constants of the forms carry the thickness as a factor, and so do their stresses
+        sigma, across = (stress / forms.section.thickness for stress in forms.stresses(self._u))
+        # s:s of the tensor in three dimensions: beside its part in d dimensions, ``across`` lies on
+        # the diagonal as often as dimensions are missing
         mean = (ufl.tr(sigma) + across) / 3
         deviator = sigma - mean * ufl.Identity(space.dimension)
         squares = ufl.inner(deviator, deviator) + (3 - space.dimension) * (across - mean) ** 2
@@ -77,11 +77,16 @@ class VonMises:
         self._volume = cell_volumes(space.mesh)
 
     def __call__(self, nodal: Array, t: float = 0.0) -> Array:
-        """Return the stresses of nodal displacements (owned nodes, d) at a time; collective."""
+        """Return the mean stresses (owned cells,) [Pa]. Collective.
+
+        Args:
+            nodal: (owned nodes, d) displacements [m].
+            t: time [s], of initial strains.
+        """
         self._u.x.array[: nodal.size] = nodal.ravel()
         self._u.x.scatter_forward()
         self._forms.follow(self._u, t)
-        return np.asarray(self._assembled(self._form).array_r / self._volume)
+        return np.asarray(self._assemble(self._form).array_r / self._volume)
 
 
 _CELLS = {
@@ -106,8 +111,10 @@ _RUBBING = ("contact_traction_t", "slip")
 class XDMF:
     """Write a frame every so many steps, and one of the initial state.
 
-    ``frames_per_file``: each time so many frames have files of their own they are put into one:
-    some systems want few.
+    Args:
+        every: a frame each so many steps.
+        frames_per_file: each time so many frames have files of their own they are put into one:
+            some file systems want few files.
     """
 
     every: Annotated[int, Positive] = 10
@@ -119,9 +126,13 @@ class XDMF:
     def open(
         self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]
     ) -> "FrameWriter":
-        """Write the mesh; go on after the frames of ``kept`` (step -> time) that are in the folder.
+        """Write the mesh, and return what writes the frames. Collective.
 
-        Collective.
+        Args:
+            problem: that of the run.
+            folder: that of the run.
+            kept: step -> time [s] of frames with which the run goes on; those of them that are in
+                the folder stay, and all others are removed.
         """
         space = problem.system.space
         if isinstance(space, MatrixSpace):
@@ -133,9 +144,13 @@ class XDMF:
 
 @dataclass(frozen=True)
 class Cells:
-    """Hold the cells of a frame.
+    """Hold the owned cells of a frame.
 
-    This is XDMF's name of them, nodes of the owned ones, their numbers, and their stress.
+    Attributes:
+        kind: XDMF's name of them.
+        nodes: (k, v) numbers of their nodes, in VTK's order.
+        numbers: (k,) their numbers in the file.
+        von_mises: computes their stress, None where the forms have none.
     """
 
     kind: str
@@ -145,7 +160,12 @@ class Cells:
 
 
 class FrameWriter:
-    """Write the frames of a run, so many in an HDF5 file."""
+    """Write the frames of a run.
+
+    A frame is written into a file of its own, at the path "/". Each time ``per_file`` frames have
+    one they are collected in one file, each in a group of its own. ``_places`` says which file and
+    group a step is in, and the index lists the steps of ``_times``: both are those of rank 0.
+    """
 
     def __init__(
         self,
@@ -153,21 +173,30 @@ class FrameWriter:
         folder: Path,
         kept: Mapping[int, float],
         per_file: int,
-        shown: Cells,
+        cells: Cells,
     ) -> None:
+        """Write the mesh, and the index of the frames that stay. Collective.
+
+        Args:
+            problem: that of the run.
+            folder: that of the run.
+            kept: step -> time [s] of frames with which the run goes on.
+            per_file: how many frames are collected in a file.
+            cells: those of the mesh, or points.
+        """
         space: Any = problem.system.space
         self._problem = problem
         self._space = space
         self._folder = folder
         self._per_file = per_file
         self._names = _VECTORS + (_RUBBING if problem.frictional else ())
-        self._type = shown.kind
-        self._cell_numbers = shown.numbers
-        self._von_mises = shown.von_mises
-        points = on_first(space.comm, space.nodes, _three(space.points))
-        cells = on_first(space.comm, self._cell_numbers, shown.nodes)
-        self._shape = (len(points), *cells.shape)
-        on_root(space.comm, partial(self._start, points, cells, kept))
+        self._type = cells.kind
+        self._cell_numbers = cells.numbers
+        self._von_mises = cells.von_mises
+        points = on_first(space.comm, space.nodes, _pad_axes(space.points))
+        rows = on_first(space.comm, self._cell_numbers, cells.nodes)
+        self._shape = (len(points), *rows.shape)
+        on_root(space.comm, partial(self._start, points, rows, kept))
 
     def _start(self, points: Array, cells: Array, kept: Mapping[int, float]) -> None:
         """Write the mesh and the index of the frames that are kept, on rank 0."""
@@ -178,23 +207,25 @@ class FrameWriter:
             file["cells"] = cells
 
         hdf5_atomically(folder / "mesh.h5", fill)
-        found = list_frames(self._folder)
-        self._times = {k: t for k, t in sorted(kept.items()) if k in found}
-        self._places = {k: found[k] for k in self._times}
+        stored = list_frames(self._folder)
+        self._times = {k: t for k, t in sorted(kept.items()) if k in stored}
+        self._places = {k: stored[k] for k in self._times}
         if self._times:
             self._write_index()
-        for path in {path for k, (path, group) in found.items() if group != "/" and k not in kept}:
+        # files with frames that are not kept are written anew with the others of theirs
+        mixed = {path for k, (path, group) in stored.items() if group != "/" and k not in kept}
+        for path in mixed:
             self._collect(path, [k for k, place in self._places.items() if place[0] == path])
         self._remove_others()
 
     def _collect(self, target: Path, steps: Sequence[int]) -> None:
-        """Put these frames into one file, in the place of the one that has this name."""
+        """Put the frames of these steps into one file, which may replace one of theirs."""
 
         def fill(file: Any) -> None:
             for k in steps:
                 path, group = self._places[k]
-                with open_hdf5(path) as one:
-                    one[group].copy_to(file, f"{k:06d}")
+                with open_hdf5(path) as source:
+                    source[group].copy_to(file, f"{k:06d}")
 
         hdf5_atomically(target, fill)
         self._places |= {k: (target, f"/{k:06d}") for k in steps}
@@ -208,51 +239,68 @@ class FrameWriter:
                 remove(folder / name)
 
     def write(self, state: State, acceleration: Array, report: Report | None = None) -> None:
-        """Write a frame of state, acceleration of its step (both in the rotated basis) and report.
+        """Write a frame. Collective.
 
-        Collective.
+        Args:
+            state: at the end of the step.
+            acceleration: (n,) of the step, in the rotated basis [m/s²].
+            report: that of the step, which tells what slips; None for the initial state.
         """
         problem = self._problem
         space = self._space
-        moving = [
+
+        # motion of the nodes and stress of the cells
+        vectors = [
             space.expand(problem.cartesian(x), state.t, derivative)
             for derivative, x in enumerate((state.u, state.v, acceleration))
         ]
-        von_mises = self._von_mises
-        stress = (
-            None
-            if von_mises is None
-            else on_first(space.comm, self._cell_numbers, von_mises(moving[0], state.t))
-        )
+        stress = None
+        if self._von_mises is not None:
+            own = self._von_mises(vectors[0], state.t)
+            stress = on_first(space.comm, self._cell_numbers, own)
+
+        # contact: 1 open, 2 sticking, 3 slipping
         slipping = np.zeros(problem.surface.count, dtype=bool)
         if problem.frictional and report is not None:
-            slipping = slipped(report)
+            slipping = find_slipping(report)
         pressure, status = nodal_contact(
             problem, state, np.where(state.active, np.where(slipping, 3, 2), 1)
         )
         if problem.frictional:
-            moving += [between(problem, nodal) for nodal in self._rubbing(state)]
-        rows = np.hstack([*(_three(nodal) for nodal in moving), pressure, status])
+            vectors += [between(problem, nodal) for nodal in self._compute_rubbing(state)]
+
+        # rank 0 writes the rows of all, in the order of ``_names``
+        rows = np.hstack([*(_pad_axes(nodal) for nodal in vectors), pressure, status])
         on_root(
             space.comm, partial(self._write, state, on_first(space.comm, space.nodes, rows), stress)
         )
 
-    def _rubbing(self, state: State) -> list[Array]:
-        """Tangential traction and slip at the owned nodes, (k, d) each."""
+    def _compute_rubbing(self, state: State) -> list[Array]:
+        """Return tangential traction [Pa] and slip [m] at the owned nodes, (k, d) each."""
         surface = self._problem.surface
         slip = surface.slip(state.u, state.t)
         r_t = np.zeros_like(slip) if state.r_t is None else state.r_t
         return [self._along_axes(values) for values in (r_t / surface.weights[:, None], slip)]
 
     def _along_axes(self, tangential: Array) -> Array:
-        """Components (m, d - 1) in nodal tangents as vectors at the owned nodes."""
+        """Return vectors at the owned nodes (k, d) of components in nodal tangents (m, d - 1)."""
         space = self._space
         surface = self._problem.surface
-        turned = surface.reaction_load(np.zeros(surface.count), len(space.ids), tangential)
-        along = surface.along_axes(turned)  # tangents are at right angles to all that is oblique
-        return NodalSpace.expand(space, along, 0.0)  # not what is prescribed or follows
+        in_frames = surface.reaction_load(np.zeros(surface.count), len(space.ids), tangential)
+        # forces and motions turn alike here, as tangents are at right angles to all that is oblique
+        along = surface.along_axes(in_frames)
+        # of the free unknowns alone: what is prescribed or follows others has no part in it
+        return NodalSpace.expand(space, along, 0.0)
 
     def _write(self, state: State, nodal: Array, stress: Array | None) -> None:
+        """Write a frame and the index that names it, on rank 0.
+
+        Args:
+            state: that of the frame.
+            nodal: (nodes, 3 vectors + 2) values at all nodes.
+            stress: (cells,) von Mises stresses [Pa], None without.
+        """
+
         def fill(file: Any) -> None:
             for i, name in enumerate(self._names):
                 file[name] = nodal[:, 3 * i : 3 * i + 3]
@@ -275,7 +323,7 @@ class FrameWriter:
 
     def _write_index(self) -> None:
         """Write fields.xdmf with all complete frames."""
-        frames = "".join(self._grid(k, t) for k, t in self._times.items())
+        frames = "".join(self._describe_frame(k, t) for k, t in self._times.items())
         text = (
             '<?xml version="1.0"?>\n<Xdmf Version="3.0"><Domain>\n<Grid Name="frames" '
             'GridType="Collection" '
@@ -283,42 +331,42 @@ class FrameWriter:
         )
         write_atomically(self._folder / FIELDS_INDEX, text.encode())
 
-    def _grid(self, k: int, t: float) -> str:
+    def _describe_frame(self, k: int, t: float) -> str:
+        """Return XDMF's Grid of the frame of step k at time t [s]."""
         nodes, cells, corners = self._shape
         path, group = self._places[k]
         mesh = f"{FIELDS}/mesh.h5"
         frame = f"{FIELDS}/{path.name}:{group.rstrip('/')}"
 
-        def attribute(
-            name: str, center: str, *shape: int, number: str = "Float", size: int = 8
-        ) -> str:
+        def describe(name: str, center: str, *shape: int, **number: Any) -> str:
             kind = "Vector" if len(shape) == 2 else "Scalar"
-            item = _item(shape, f"{frame}/{name}", number, size)
+            item = _describe_data(shape, f"{frame}/{name}", **number)
             return (
                 f'<Attribute Name="{name}" AttributeType="{kind}" '
                 f'Center="{center}">{item}</Attribute>\n'
             )
 
-        attributes = [attribute(name, "Node", nodes, 3) for name in self._names]
-        attributes.append(attribute("contact_pressure", "Node", nodes))
-        attributes.append(attribute("contact_status", "Node", nodes, number="Int", size=4))
+        attributes = [describe(name, "Node", nodes, 3) for name in self._names]
+        attributes.append(describe("contact_pressure", "Node", nodes))
+        attributes.append(describe("contact_status", "Node", nodes, number="Int", size=4))
         if self._von_mises is not None:
-            attributes.append(attribute("von_mises", "Cell", cells))
+            attributes.append(describe("von_mises", "Cell", cells))
         return (
             f'<Grid Name="step {k}" GridType="Uniform"><Time Value="{t!r}"/>\n'
             f'<Topology TopologyType="{self._type}" NumberOfElements="{cells}" '
             f'NodesPerElement="{corners}">'
-            f"{_item((cells, corners), f'{mesh}:/cells', 'Int')}</Topology>\n"
-            f'<Geometry GeometryType="XYZ">{_item((nodes, 3), f"{mesh}:/points")}</Geometry>\n'
+            f"{_describe_data((cells, corners), f'{mesh}:/cells', 'Int')}</Topology>\n"
+            '<Geometry GeometryType="XYZ">'
+            f"{_describe_data((nodes, 3), f'{mesh}:/points')}</Geometry>\n"
             f"{''.join(attributes)}</Grid>\n"
         )
 
 
 def nodal_contact(problem: ContactProblem, state: State, status: Array) -> tuple[Array, Array]:
-    """Return (contact pressure, status), (k, 1) at the owned nodes. Collective.
+    """Return contact pressure [Pa] and status at the owned nodes, (k, 1) each. Collective.
 
-    They are made of those of the conditions: of several faces of a node the pressure of the one
-    that is pressed most, and the highest status.
+    A node with several conditions has the pressure of the one that is pressed most, and the highest
+    status; nodes without one have zeros.
 
     Args:
         problem: the problem.
@@ -329,9 +377,10 @@ def nodal_contact(problem: ContactProblem, state: State, status: Array) -> tuple
     blocks = blocks_of_conditions(problem)
     surface = problem.surface
     pressure, highest = np.zeros((2, len(space.nodes), 1))
-    each = state.r_n / surface.weights
-    order = np.argsort(np.abs(each), kind="stable")
-    pressure[blocks[order], 0] = each[order]
+    # written in the order of their size, so that of several the largest stays
+    pressures = state.r_n / surface.weights
+    order = np.argsort(np.abs(pressures), kind="stable")
+    pressure[blocks[order], 0] = pressures[order]
     np.maximum.at(highest[:, 0], blocks, status)
     return between(problem, pressure), between(problem, highest, np.min)
 
@@ -343,10 +392,10 @@ def blocks_of_conditions(problem: ContactProblem) -> Indices:
 
 
 def between(problem: ContactProblem, nodal: Array, mean: Any = np.mean) -> Array:
-    """Return nodal values (k, c) with those of the mid-points of contact facets. Collective.
+    """Return nodal values with those of the mid-points of contact facets added. Collective.
 
-    These are added where conditions are those of vertices only: linear from end to end, zero at
-    ends without a condition, so that ∫ p = sum r_n.
+    This is done where only vertices have conditions (P2 tetrahedra): linear from end to end, zero
+    at ends without a condition, so that ∫ p = sum r_n. Elsewhere the values are returned.
 
     Args:
         problem: the problem.
@@ -356,45 +405,48 @@ def between(problem: ContactProblem, nodal: Array, mean: Any = np.mean) -> Array
     space = cast(NodalSpace, problem.system.space)
     if space.hierarchy is None:
         return nodal
-    own = [
-        part.nodes.numbers for one in getattr(problem.surface, "parts", ()) for part in one.bubbles
-    ]
-    middles = np.concatenate(
-        from_each(space.comm, np.concatenate([np.zeros(0, dtype=np.int64), *own]))
-    )
+    # the mid-points of contact facets are the nodes of their bubbles, of any rank
+    own = [np.zeros(0, dtype=np.int64)]
+    for conditions in getattr(problem.surface, "parts", ()):
+        own += [bubbles.nodes.numbers for bubbles in conditions.bubbles]
+    middles = np.concatenate(from_each(space.comm, np.concatenate(own)))
     return space.hierarchy.between(nodal, np.isin(space.nodes, middles), mean)
 
 
-def slipped(report: Report) -> Mask:
-    """Return the points (m,) that moved along their support in a step with friction."""
+def find_slipping(report: Report) -> Mask:
+    """Return which conditions (m,) moved along their support in a step with friction."""
     step = report.step
     result = report.result
     return np.asarray(np.any(step.surface.tangential_values(result.x) != step.slip0, axis=1))
 
 
-def _item(shape: tuple[int, ...], where: str, number: str = "Float", size: int = 8) -> str:
-    """Return a DataItem in an HDF5 file."""
+def _describe_data(shape: tuple[int, ...], where: str, number: str = "Float", size: int = 8) -> str:
+    """Return XDMF's DataItem of an array in an HDF5 file.
+
+    Args:
+        shape: that of the array.
+        where: "file:path" of it.
+        number: "Float" or "Int".
+        size: bytes of a number.
+    """
     dimensions = " ".join(map(str, shape))
     kind = f'NumberType="{number}" Precision="{size}"'
     return f'<DataItem Dimensions="{dimensions}" {kind} Format="HDF">{where}</DataItem>'
 
 
-def _three(nodal: Array) -> Array:
-    """Return rows (k, d) with zeros for the missing axes, (k, 3)."""
+def _pad_axes(nodal: Array) -> Array:
+    """Return rows (k, 3) of rows (k, d), with zeros for the missing axes."""
     return np.pad(nodal, ((0, 0), (0, 3 - nodal.shape[1])))
 
 
 def _cells_of_body(problem: ContactProblem) -> Cells:
-    """Return the cells of a mesh by the numbers of their nodes. Collective.
-
-    The order is that of VTK.
-    """
+    """Return the cells of a mesh by the numbers of their nodes, in VTK's order. Collective."""
     from .. import compat
-    from ..body.space import known_matrices, space_of
+    from ..body.space import space_of, warn_of_other_matrices
 
     space = space_of("XDMF", problem.system)
     if space.forms.tells_stress:
-        known_matrices("XDMF, von_mises", problem.system, "K")
+        warn_of_other_matrices("XDMF, von_mises", problem.system, "K")
     elif space.comm.rank == 0:
         log.info(
             "XDMF: forms=… have no stress, so frames have no von_mises: give fem.Forms(…, stress=)"
@@ -402,8 +454,7 @@ def _cells_of_body(problem: ContactProblem) -> Cells:
     mesh = space.mesh
     stress = VonMises(space.forms) if space.forms.tells_stress else None
     dim = mesh.topology.dim
-    rows = space.node_of_block[
-        compat.cell_blocks(space.V)[: mesh.topology.index_map(dim).size_local]
-    ]
+    owned = mesh.topology.index_map(dim).size_local
+    rows = space.node_of_block[compat.cell_blocks(space.V)[:owned]]
     order = compat.vtk_order(mesh, rows.shape[1])
     return Cells(_CELLS[dim, rows.shape[1]], rows[:, order], compat.cell_numbers(mesh), stress)

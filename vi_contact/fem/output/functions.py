@@ -1,6 +1,4 @@
-"""Hand out states and stored frames as DOLFINx Functions.
-
-They are along the axes and with the values of ghosts.
+"""Hand out states and stored frames as DOLFINx Functions, along the axes, with values of ghosts.
 
 u and v are on the space of the system, ``system.space.V``, with the components that are prescribed
 or tied. The stress sigma(u), without viscous parts, is the L2 projection onto discontinuous fields:
@@ -29,7 +27,7 @@ from ...core.problem import ContactProblem
 from ...core.state_checks import check_problem_given, check_sizes
 from ...core.step import State
 from .. import compat
-from ..body.space import FemSpace, known_matrices, space_of
+from ..body.space import FemSpace, space_of, warn_of_other_matrices
 from .fields import between, blocks_of_conditions, nodal_contact
 
 NAMES = ("u", "v", "stress", "contact_pressure")
@@ -40,35 +38,35 @@ SAME = 1e-9  # of the size of the mesh, and of the longest time
 def as_function(
     problem: ContactProblem, state: State, name: str, *, continuous: bool = False
 ) -> Any:
-    """Return a state as a DOLFINx Function.
-
-    It is "u" [m], "v" [m/s], "stress" [Pa] (d, d) or "contact_pressure" [Pa].
+    """Return a state as a DOLFINx Function. Collective.
 
     Where a node of the contact boundary has no pressure of its own, as one that is held, the
     function has the mean of those of its neighbours, so that the error of a right pressure falls
-    with the size of the facets there too.
+    with the size of the facets there too. Every call makes a Function of its own.
 
-    ``state``: of simulate, march, static_equilibrium or quasi_static of this problem.
-    ``continuous``: the stress projected onto P1, Q1, P2 or Q2, ∫ sigma_h : tau = ∫ sigma(u) : tau.
-    Every call makes a Function of its own. Collective. InputError for a state of another problem,
-    and a system without a mesh.
+    Args:
+        problem: the problem of the state.
+        state: of simulate, march, static_equilibrium or quasi_static of this problem.
+        name: "u" [m], "v" [m/s], "stress" [Pa] (d, d) or "contact_pressure" [Pa].
+        continuous: whether the stress is projected onto P1, Q1, P2 or Q2, ∫ sigma_h : tau = ∫
+            sigma(u) : tau; else onto discontinuous fields.
+
+    Raises:
+        InputError: a state of another problem, a system without a mesh, no such quantity.
     """
-    space = _checked("as_function", problem, name, continuous)
+    space = _check_request("as_function", problem, name, continuous)
     check_sizes("as_function", problem, state)
     if name != "contact_pressure":
-        x, derivative = (state.v, 1) if name == "v" else (state.u, 0)
-        return _function(
-            problem,
-            name,
-            space.expand(problem.cartesian(x), state.t, derivative),
-            state.t,
-            continuous,
-        )
-    pressure = nodal_contact(problem, state, np.ones(len(state.r_n)))[0]
-    return _function(problem, name, with_borrowed(problem, pressure)[:, 0], state.t)
+        if name == "v":
+            nodal = space.expand(problem.cartesian(state.v), state.t, 1)
+        else:
+            nodal = space.expand(problem.cartesian(state.u), state.t, 0)
+        return _make_function(problem, name, nodal, state.t, continuous)
+    pressure, _ = nodal_contact(problem, state, np.ones(len(state.r_n)))
+    return _make_function(problem, name, add_borrowed(problem, pressure)[:, 0], state.t)
 
 
-def with_borrowed(problem: ContactProblem, pressure: Array) -> Array:
+def add_borrowed(problem: ContactProblem, pressure: Array) -> Array:
     """Return nodal contact pressures (k, 1) with those of borrowing nodes. Collective.
 
     The nodes of contact boundaries that have none of their own take the mean of those of their
@@ -77,17 +75,20 @@ def with_borrowed(problem: ContactProblem, pressure: Array) -> Array:
     space = space_of("contact_pressure", problem.system)
     surface = problem.surface
     blocks = blocks_of_conditions(problem)
-    told = np.zeros(len(space.nodes), dtype=bool)
-    told[blocks if surface.uncovered is None else blocks[~surface.uncovered]] = True
-    found = np.zeros_like(pressure)
+    # nodes with a pressure of their own: those of conditions that are not hardly covered
+    having = np.zeros(len(space.nodes), dtype=bool)
+    having[blocks if surface.uncovered is None else blocks[~surface.uncovered]] = True
+
+    # what all others borrow, and at mid-points what is between their ends
+    borrowed = np.zeros_like(pressure)
     for part in getattr(surface, "parts", ()):
         if part.borrowed is not None:
             rows = space.blocks_of(part.borrowed.numbers)
             values = part.borrowed.values(space, pressure)
-            found[rows[~told[rows]]] = values[~told[rows]]
-    kept = pressure.copy()
-    kept[blocks[~told[blocks]]] = 0.0
-    return kept + between(problem, found)
+            borrowed[rows[~having[rows]]] = values[~having[rows]]
+    own = pressure.copy()
+    own[blocks[~having[blocks]]] = 0.0
+    return own + between(problem, borrowed)
 
 
 def read_function(
@@ -99,15 +100,22 @@ def read_function(
     frame: int | None = None,
     continuous: bool = False,
 ) -> Any:
-    """Return a frame in the folder of a run (``fields=fem.XDMF(…)``).
+    """Return a frame in the folder of a run, as ``as_function`` returns a state. Collective.
 
-    It is as ``as_function`` returns a state.
+    The run, with ``fields=fem.XDMF(…)``, may have had any number of ranks.
 
-    ``t``: its time [s]; ``frame``: its number in the order of time, 0 for the first and -1 for the
-    last. The run may have had any number of ranks. Collective. InputError for a time without a
-    frame, and fields of another mesh.
+    Args:
+        problem: that of the run.
+        folder: that of the run.
+        name: "u", "v", "stress" or "contact_pressure", as of ``as_function``.
+        t: time of the frame [s]; give it or ``frame``.
+        frame: its number in the order of time, 0 for the first and -1 for the last.
+        continuous: whether the stress is projected onto continuous fields, as of ``as_function``.
+
+    Raises:
+        InputError: a time without a frame, fields of another mesh, files that are damaged.
     """
-    space = _checked("read_function", problem, name, continuous)
+    space = _check_request("read_function", problem, name, continuous)
     optional(number, "read_function", "t", t, unit="s")
     optional(
         instance,
@@ -120,26 +128,24 @@ def read_function(
     kind = "u" if name == "stress" else name
     comm = space.comm
     d = space.dimension
-    points, values, t = comm.bcast(on_root(comm, lambda: _stored(Path(folder), kind, t, frame)))
+    points, values, t = comm.bcast(
+        on_root(comm, lambda: _read_stored(Path(folder), kind, t, frame))
+    )
+
+    # the nodes of a frame have the numbers of the mesh: they must be at the same places
     fits = len(points) > np.max(space.nodes, initial=-1)
-    fits = (
-        fits
-        and np.max(np.abs(points[space.nodes, :d] - space.points), initial=0.0) <= SAME * space.size
-    )
-    refuse(
-        [
-            ""
-            if fits
-            else f"the fields in '{folder}' are of another mesh: give the problem of that run"
-        ],
-        comm,
-    )
+    if fits:
+        apart = np.max(np.abs(points[space.nodes, :d] - space.points), initial=0.0)
+        fits = apart <= SAME * space.size
+    defect = f"the fields in '{folder}' are of another mesh: give the problem of that run"
+    refuse(["" if fits else defect], comm)
     if name == "contact_pressure":
-        return _function(problem, name, with_borrowed(problem, values[space.nodes, None])[:, 0], t)
-    return _function(problem, name, values[space.nodes, :d], t, continuous)
+        pressure = add_borrowed(problem, values[space.nodes, None])
+        return _make_function(problem, name, pressure[:, 0], t)
+    return _make_function(problem, name, values[space.nodes, :d], t, continuous)
 
 
-def _checked(owner: str, problem: Any, name: Any, continuous: Any) -> FemSpace:
+def _check_request(owner: str, problem: Any, name: Any, continuous: Any) -> FemSpace:
     """Return the space of the problem.
 
     Args:
@@ -160,64 +166,72 @@ def _checked(owner: str, problem: Any, name: Any, continuous: Any) -> FemSpace:
     return space_of(owner, problem.system)
 
 
-def _function(
+def _make_function(
     problem: ContactProblem, name: str, nodal: Array, t: float, continuous: bool = False
 ) -> Any:
-    """Return the Function of values at the owned nodes, (k,) or (k, d), at a time.
-
-    The stress is that of displacements.
+    """Return the Function of a quantity from values at the owned nodes at a time. Collective.
 
     Args:
         problem: the problem.
         name: the quantity.
-        nodal: values at the owned nodes.
+        nodal: (k,) or (k, d) its values at the owned nodes; of the stress, displacements [m].
         t: time [s].
-        continuous: whether the stress is projected.
+        continuous: whether the stress is projected onto continuous fields.
     """
     system = problem.system
     space = space_of(name, problem.system)
-    V = (
-        system.make_once("scalars", lambda: compat.lagrange(space.mesh, space.degree))
-        if nodal.ndim == 1
-        else space.V
-    )
-    found = compat.function(V)
-    values = nodal[_blocks(V, space.V)].ravel()
-    found.x.array[: values.size] = values
-    found.x.scatter_forward()
+    V = space.V
+    if nodal.ndim == 1:
+        V = system.make_once("scalars", lambda: compat.lagrange(space.mesh, space.degree))
+    function = compat.function(V)
+    values = nodal[_match_blocks(V, space.V)].ravel()
+    function.x.array[: values.size] = values
+    function.x.scatter_forward()
     if name == "stress":
-        known_matrices("stress", system, "K")
-        stress = system.make_once(f"stress {continuous}", lambda: Stress(space, continuous))
-        found = stress(found, t)
-    found.name = name
-    return found
+        warn_of_other_matrices("stress", system, "K")
+        project = system.make_once(f"stress {continuous}", lambda: Stress(space, continuous))
+        function = project(function, t)
+    function.name = name
+    return function
 
 
-def _blocks(of: Any, among: Any) -> Indices:
-    """Return the owned blocks of unknowns of a space among those of another one.
+def _match_blocks(space: Any, other: Any) -> Indices:
+    """Return which blocks of another space the owned blocks of a space are, (owned,).
 
-    Both have the same element.
+    Both have the same element on one mesh, so that a node has the same place in a cell; their
+    blocks may be numbered differently.
     """
-    owned = of.dofmap.index_map.size_local
-    ghosts = of.dofmap.index_map.num_ghosts
+    owned = space.dofmap.index_map.size_local
+    ghosts = space.dofmap.index_map.num_ghosts
     blocks = np.zeros(owned + ghosts, dtype=np.int64)
-    blocks[compat.cell_blocks(of)] = compat.cell_blocks(among)
+    blocks[compat.cell_blocks(space)] = compat.cell_blocks(other)
     return blocks[:owned]
 
 
 class Stress:
-    """Project sigma(u) by conjugate gradients.
+    """Project sigma(u) onto a space of tensors, component by component.
 
-    M sigma_c = ∫ sigma(u) : tau_c for every component c.
+        M sigma_c = b_c,   M_ij = ∫ phi_i phi_j,   b_ci = ∫ sigma_c(u) phi_i
+
+    by conjugate gradients with Jacobi preconditioning.
     """
 
     def __init__(self, space: FemSpace, continuous: bool) -> None:
+        """Assemble M. Collective.
+
+        Args:
+            space: the body's unknowns, with its forms.
+            continuous: whether the tensors are continuous, of the degree of u; else discontinuous,
+                one degree lower on simplices, where the gradient of u is such a field.
+        """
         d = space.dimension
-        degree = space.degree - (compat.is_simplex(space.mesh) and not continuous)
+        degree = space.degree
+        if compat.is_simplex(space.mesh) and not continuous:
+            degree = space.degree - 1
         self._tensors = compat.lagrange(space.mesh, degree, (d, d), continuous=continuous)
         self._u = compat.function(space.V)
         scalars = compat.lagrange(space.mesh, degree, continuous=continuous)
-        self._blocks = _blocks(scalars, self._tensors)
+        self._blocks = _match_blocks(scalars, self._tensors)
         dx = ufl.dx(metadata={"quadrature_degree": 2 * degree + 2})
         self._forms = space.forms
         sigma = space.forms.stress(self._u) / space.forms.section.thickness
@@ -232,45 +246,56 @@ class Stress:
         self._ksp.setTolerances(rtol=ACCURACY, atol=0.0)
 
     def __call__(self, u: Any, t: float) -> Any:
-        """Return the stress (d, d) of displacements at a time; collective."""
+        """Return the stress (d, d) [Pa] of displacements at a time [s]. Collective."""
         self._u.x.array[:] = u.x.array
         self._forms.follow(self._u, t)
-        found = compat.function(self._tensors)
-        values = found.x.array.reshape(-1, self._tensors.dofmap.index_map_bs)
+        stress = compat.function(self._tensors)
+        values = stress.x.array.reshape(-1, self._tensors.dofmap.index_map_bs)
         loads = compat.assemble_vector(self._load).array_r.reshape(-1, values.shape[1])
         for c in range(values.shape[1]):
             self._b.array[:] = loads[self._blocks, c]
             self._ksp.solve(self._b, self._x)
             values[self._blocks, c] = self._x.array_r
-        found.x.scatter_forward()
-        return found
+        stress.x.scatter_forward()
+        return stress
 
 
-def _stored(
+def _read_stored(
     folder: Path, name: str, t: float | None, frame: int | None
 ) -> tuple[Array, Array, float]:
-    """Return points of the mesh, a quantity of a frame at them, and its time."""
+    """Return points of the mesh (nodes, 3) [m], a quantity of a frame there, and its time [s].
+
+    Args:
+        folder: that of the run.
+        name: the quantity, as the files call it.
+        t: time of the frame [s], or None.
+        frame: its number, or None.
+
+    Raises:
+        InputError: there are no fields, or no such frame, or files are damaged.
+    """
     if not is_own(folder / FIELDS_INDEX):
         raise InputError(
             f"'{folder}' has no {FIELDS_INDEX}: run again with out and fields=fem.XDMF(every=10)"
         )
     try:
+        # the index says at which times there are frames, and where each of them is: "file:path"
         index: Any = ET.fromstring(read_bytes(folder / FIELDS_INDEX))
-        places = sorted(
-            (
-                float(grid.find("Time").get("Value")),
-                grid.find(f"Attribute[@Name='{name}']/DataItem").text,
-            )
-            for grid in index.findall(".//Grid[@GridType='Uniform']")
-        )
-        time, place = places[_chosen([time for time, _ in places], t, frame)]
-        file, path = place.split(":")
-        known = {str(one.relative_to(folder)): one for one, _ in list_frames(folder).values()}
+        places = []
+        for grid in index.findall(".//Grid[@GridType='Uniform']"):
+            time = float(grid.find("Time").get("Value"))
+            places.append((time, grid.find(f"Attribute[@Name='{name}']/DataItem").text))
+        places.sort()
+        time, place = places[_choose_frame([time for time, _ in places], t, frame)]
+        file, dataset = place.split(":")
+
+        # only files that a run writes are opened, whatever the index names
+        known = {str(own.relative_to(folder)): own for own, _ in list_frames(folder).values()}
         with (
             open_hdf5(inner_folder(folder, FIELDS) / "mesh.h5") as mesh,
             open_hdf5(known[file]) as fields,
         ):
-            return mesh["points"][()], fields[path][()], time
+            return mesh["points"][()], fields[dataset][()], time
     except InputError:
         raise
     except (
@@ -289,28 +314,29 @@ def _stored(
         ) from error
 
 
-def _chosen(times: list[float], t: float | None, frame: int | None) -> int:
-    """Return the number of the frame of a time, or of this number.
+def _choose_frame(times: list[float], t: float | None, frame: int | None) -> int:
+    """Return the place among ``times`` of the frame that is asked for.
 
     Args:
-        times: those of the frames [s].
+        times: those of the frames, ascending [s].
         t: the time that is asked for, or None.
         frame: the number that is asked for, or None.
+
+    Raises:
+        InputError: there is none, or both or neither of t and frame are given.
     """
-    told = ", ".join(f"{one:.9g}" for one in times[:12]) + (
-        f", … {times[-1]:.9g}" if len(times) > 12 else ""
-    )
-    stored = f"the {len(times)} frames are at t = {told} s"
+    listed = ", ".join(f"{time:.9g}" for time in times[:12])
+    if len(times) > 12:
+        listed += f", … {times[-1]:.9g}"
+    stored = f"the {len(times)} frames are at t = {listed} s"
     if (t is None) == (frame is None):
         raise InputError(f"a stored frame: give either t or frame, and not both; {stored}")
     slack = SAME * max(map(abs, times), default=0.0)
-    wanted = (
-        range(len(times))[frame:][:1]
-        if t is None
-        else [i for i, one in enumerate(times) if abs(one - t) <= slack]
-    )
-    if not wanted or (frame or 0) < -len(times):
-        raise InputError(
-            f"no frame {quote(frame) if t is None else f'at t = {quote(t)} s'}: {stored}"
-        )
-    return wanted[0]
+    if t is not None:
+        near = [i for i, time in enumerate(times) if abs(time - t) <= slack]
+        if not near:
+            raise InputError(f"no frame at t = {quote(t)} s: {stored}")
+        return near[0]
+    if frame is None or not -len(times) <= frame < len(times):
+        raise InputError(f"no frame {quote(frame)}: {stored}")
+    return frame % len(times)

@@ -1,11 +1,9 @@
-"""Compute the work of a group of cells on virtual displacements.
-
-This gives the resultants of nodal forces without making the forces.
+"""Compute resultants of nodal forces as the work of a group of cells on virtual displacements.
 
 The nodal forces that hold a group of cells in its motion are q = K u + C v + M a - f, all of these
 cells alone, with a the absolute acceleration and f their loads. For a nodal field r, rᵀq is a
 number, and as K, C, M are symmetric it is (K r)ᵀu + (C r)ᵀv + (M r)ᵀa - rᵀf: three sparse products
-a step, however many cells there are.
+a step, however many cells there are. With a unit translation or rotation as r it is a resultant.
 """
 
 import logging
@@ -27,17 +25,18 @@ from ..body.conditions import as_tuple
 from ..body.initial_strains import InitialStrain
 from ..body.linear_forms import LOADS, LinearForm, Loads
 from ..body.loads import evaluate
-from ..body.space import known_matrices, space_of
-from ..contact.surface import moved_by_held
+from ..body.space import space_of, warn_of_other_matrices
+from ..contact.surface import make_obstacle_motion
 from ..mesh.group_checks import facets_of
 
 log = logging.getLogger(__name__)
 
-# (density, its load or None) -> (motions, owned components)
+# (density, its load or None) -> (motions, owned components): what parts of cells beyond a cut have
+# of inertia, its damping and loads (``cut_cells.work_beyond``)
 Beyond = Callable[[Array | float, Any], Array]
-# (components of nodes that move, (owned, d) or (owned, 1); centre of their rotations (d,); mask of
-# local cells of the group, ghosts too, None for all; what is taken away of inertia, its damping and
-# loads, or None)
+# a part of the body that moves rigidly: (components of nodes that move, (owned, d) or (owned, 1);
+# centre of their rotations (d,) [m]; mask of local cells of the group that holds them, ghosts too,
+# None for all; what is taken away of these cells, or None)
 Rigid = tuple[Mask, Array, Mask | None, Beyond | None]
 
 
@@ -57,58 +56,72 @@ def check_actions(owner: str, loads: Any, gravity: Any) -> None:
 class NodalWork:
     """Compute rᵀ(K u + C v + M a - f) for any number of pairs (r, group of cells).
 
-    Args:
-        owner: what is recorded, for messages.
-        problem: its system is made by ``fem.assemble``; InputError otherwise.
-        loads: those given to ``fem.assemble``: what acts on cells of the group belongs to their
-            balance.
-        gravity: acceleration (d,) [m/s²] of ``with_weight``, which acts on the mass of the cells.
+    ``take`` states the pairs, and assembles the rows K r, C r, M r and those of loads; ``at_rest``
+    and ``of_step`` multiply them with a state and with a step.
     """
 
     def __init__(
         self, owner: str, problem: ContactProblem, loads: Loads, gravity: Sequence[float] | None
     ) -> None:
+        """Compile the forms. Collective.
+
+        Args:
+            owner: what is recorded, for messages.
+            problem: its system is made by ``fem.assemble``.
+            loads: those given to ``fem.assemble``: what acts on cells of the group belongs to their
+                balance.
+            gravity: acceleration (d,) [m/s²] of ``with_weight``, which acts on the mass of the
+                cells.
+
+        Raises:
+            InputError: another system, loads on another mesh, a gravity of another dimension.
+        """
         space = space_of("NodalWork", problem.system)
-        known_matrices("reactions and section forces", problem.system, "MCK")
+        warn_of_other_matrices("reactions and section forces", problem.system, "MCK")
         self._problem = problem
         self.space = space
-        # known to the body
-        self._loads: Any = [one for one in as_tuple(loads) if not isinstance(one, InitialStrain)]
-        for facets in (getattr(load, "facets", None) for load in self._loads):
+        # initial strains are known to the forms of the body
+        self._loads: Any = [load for load in as_tuple(loads) if not isinstance(load, InitialStrain)]
+        for load in self._loads:
+            facets = getattr(load, "facets", None)
             if facets is not None:
                 facets_of("NodalWork", "the facets of loads", facets, space.mesh)
-        self._gravity = (
-            np.zeros(space.dimension) if gravity is None else np.asarray(gravity, dtype=float)
-        )
+        self._gravity = np.zeros(space.dimension)
+        if gravity is not None:
+            self._gravity = np.asarray(gravity, dtype=float)
         if self._gravity.shape != (space.dimension,):
             raise InputError(
                 f"gravity has {self._gravity.size} components: give {space.dimension} numbers"
             )
+
+        # linear forms with a Function r and an indicator of the group: their products with nodal u,
+        # v, a, initial strains and loads are rᵀK u, rᵀC v, rᵀM a, -rᵀf_0 and rᵀf
         self._r = compat.function(space.V)
         self._inside = compat.function(compat.cell_space(space.mesh))
-        self._forms = [
-            space.compiled(space.forms.against(name, self._r, self._inside))
-            if name != "C" or space.forms.damped
-            else None
-            for name in ("K", "C", "M")
-        ]
+        self._forms: list[Any] = []
+        for name in ("K", "C", "M"):
+            form = None
+            if name != "C" or space.forms.damped:
+                form = space.compile_form(space.forms.against(name, self._r, self._inside))
+            self._forms.append(form)
         self._initial = [] if space.forms.initial is None else [space.forms.initial]
-        self._forms += [space.compiled(one.against(self._r, self._inside)) for one in self._initial]
+        for strains in self._initial:
+            self._forms.append(space.compile_form(strains.against(self._r, self._inside)))
         g = ufl.TestFunction(space.V)
         mesh = space.mesh
         h = space.forms.section.thickness
-        self._load_forms = [  # their products with nodal values of the loads are rᵀf
-            None
-            if isinstance(load, LinearForm)
-            else space.compiled(
-                h * self._inside * ufl.inner(self._r, load.acting(g, mesh)) * load.measure(mesh)
-            )
-            for load in self._loads
-        ]
+        self._load_forms: list[Any] = []
+        for load in self._loads:
+            form = None
+            if not isinstance(load, LinearForm):
+                work = h * self._inside * ufl.inner(self._r, load.acting(g, mesh))
+                form = space.compile_form(work * load.measure(mesh))
+            self._load_forms.append(form)
+        # a LinearForm has nodal forces instead, here by the number of the load
         self._nodal = {
-            k: one.full(space, h)
-            for k, one in enumerate(self._loads)
-            if isinstance(one, LinearForm)
+            k: load.full(space, h)
+            for k, load in enumerate(self._loads)
+            if isinstance(load, LinearForm)
         }
         self._tell_constant_loads(owner)
 
@@ -135,7 +148,13 @@ class NodalWork:
             )
 
     def take(self, parts: Sequence[Rigid]) -> None:
-        """Take the rigid motions of each part as r, one after the other. Collective."""
+        """Take the rigid motions of each part as r, one after the other. Collective.
+
+        Raises:
+            InputError: a cut whose cells have a LinearForm, or through cells whose density is
+                unknown.
+        """
+        space = self.space
         if self._nodal and any(
             cells is not None or beyond is not None for _, _, cells, beyond in parts
         ):
@@ -143,37 +162,35 @@ class NodalWork:
                 "section forces: the part of a LinearForm on the cells of a cut is unknown; give "
                 "these loads as Traction and BodyForce, or record Reactions"
             )
-        forms = [*self._forms, *self._load_forms]
-        ours = self.space.forms
-        if not ours.densities and any(beyond for *_, beyond in parts):
+        if not space.forms.densities and any(beyond for *_, beyond in parts):
             raise InputError(
                 "a section goes through elements, and with forms=… the mass of their parts is "
                 "unknown: let it run along element sides, or give a material for the density in "
                 "place of mass="
             )
-        densities = [
-            (ours.cellwise(name), None) if ours.densities else None for name in ("alpha_rho", "rho")
-        ]
-        densities += [(ours.section.thickness, load) for load in self._loads]
+        # of each row of works one for every motion, and how far held nodes move obstacles then
+        forms = [*self._forms, *self._load_forms]
         rows: list[list[Any]] = [[] for _ in forms]
-        moved = (
-            [moved_by_held(self.space, made)]
-            if (made := getattr(self._problem.surface, "parts", ()))
-            else []
-        )
-        # how far each motion of held nodes moves obstacles
+        conditions = getattr(self._problem.surface, "parts", ())
+        move_obstacles = make_obstacle_motion(space, conditions) if conditions else None
         self._direct: list[tuple[Array, Array]] = []
+        densities = self._densities()
         for where, centre, cells, beyond in parts:
+            # the forms integrate over whole cells: what is beyond a cut is taken away from them, of
+            # C, M and loads in the order of ``forms`` (nothing of K and initial strains)
             self._inside.x.array[:] = 1.0 if cells is None else cells
-            less = [beyond and beyond(*density) for density in densities]  # type: ignore[misc]
-            less[2:2] = [None for _ in self._initial]
-            straight = self.space.held & where & (cells is None or self.space.hierarchy is not None)
-            for k, motion in enumerate(rigid_motions(self.space.points, centre)):
-                self._direct += [one(np.where(straight, motion, 0.0)) for one in moved]
+            less = [beyond and beyond(*density) for density in densities]
+            C, M, *loads = less
+            less = [None, C, M, *(None for _ in self._initial), *loads]
+            # contact forces on held nodes do not reach their cells
+            straight = space.held & where & (cells is None or space.hierarchy is not None)
+            for k, motion in enumerate(rigid_motions(space.points, centre)):
+                if move_obstacles is not None:
+                    self._direct.append(move_obstacles(np.where(straight, motion, 0.0)))
                 self._r.x.array[: motion.size] = np.where(where, motion, 0.0).ravel()
                 self._r.x.scatter_forward()
-                self.space.forms.follow(self._r)
-                for n, (own, form, away) in enumerate(zip(rows, forms, [None, *less], strict=True)):
+                space.forms.follow(self._r)
+                for n, (own, form, away) in enumerate(zip(rows, forms, less, strict=True)):
                     if form is not None:
                         row = compat.assemble_vector(form).array_r
                         own.append(sp.csr_matrix(row if away is None else row - away[k]))
@@ -183,10 +200,22 @@ class NodalWork:
         self._matrices: list[Any] = [sp.vstack(own).tocsr() if own else None for own in rows]
         self._still: dict[int, Array] = {}
 
-    def at_rest(self, state: State) -> Array:
-        """Return the work of a state without acceleration, (count,).
+    def _densities(self) -> list[Any]:
+        """Return (density, its load) of the damping and inertia of mass, then of all loads.
 
-        It is a static one, or the start of a run.
+        They are of each local cell, [kg/(s m³)] and [kg/m³] times the thickness; of loads it is the
+        thickness [m]. None stands for what the body's forms do not tell.
+        """
+        ours = self.space.forms
+        densities: list[Any] = [
+            (ours.cellwise(name), None) if ours.densities else None for name in ("alpha_rho", "rho")
+        ]
+        return densities + [(ours.section.thickness, load) for load in self._loads]
+
+    def at_rest(self, state: State) -> Array:
+        """Return the works (count,) [N, N m] of a state without acceleration. Collective.
+
+        Such is a static one, or the start of a run.
         """
         problem = self._problem
         space = self.space
@@ -194,78 +223,83 @@ class NodalWork:
         motion = [
             space.expand(problem.cartesian(x), t, k) for k, x in enumerate((state.u, state.v))
         ]
-        return self._sum(
-            [*motion, np.zeros_like(motion[0]) - self._gravity], lambda one: one(t), state
-        )
+        # gravity g acts on the mass as the acceleration -g
+        motion.append(np.zeros_like(motion[0]) - self._gravity)
+        return self._sum(motion, lambda function: function(t), state)
 
     def of_step(self, report: Report) -> Array:
-        """Return the work in a step's equation of motion (``Report.balance``), (count,).
+        """Return the works (count,) [N, N m] in a step's equation of motion. Collective.
 
-        It takes absolute accelerations.
-
-        Loads, prescribed and ground motion are taken between the ends of the step where the balance
-        has its u.
+        This is ``Report.balance``, with absolute accelerations. Loads, prescribed and ground motion
+        are taken between the ends of the step where the balance has its u.
         """
         problem = self._problem
         space = self.space
         balance = report.balance
-        late = self._place(report)
+        late = self._weigh_end(report)
         t0 = report.old.t
         t1 = report.new.t
 
         def between(value: Callable[[float], Any]) -> Any:
-            return value(t1) if late == 1.0 else (1.0 - late) * value(t0) + late * value(t1)
+            if late == 1.0:
+                return value(t1)
+            return (1.0 - late) * value(t0) + late * value(t1)
 
         motion = []
         for k, x in enumerate((balance.u, balance.v, balance.a)):
             free = problem.cartesian(x)
-            motion.append(
-                between(partial(space.expand, free, derivative=k))
-                if space.moves
-                else space.expand(free, t1, k)
-            )
+            if space.moves:
+                motion.append(between(partial(space.expand, free, derivative=k)))
+            else:
+                motion.append(space.expand(free, t1, k))
         motion[2] = motion[2] + between(problem.ground_acceleration) - self._gravity
         return self._sum(motion, between, balance)
 
-    def _place(self, report: Report) -> float:
-        """Return w of u = (1 - w) u_old + w u_new; the end where nothing moved."""
+    def _weigh_end(self, report: Report) -> float:
+        """Return w of u = (1 - w) u_old + w u_new in the balance. Collective.
+
+        By least squares w = (u - u_old)·(u_new - u_old) / |u_new - u_old|², between 0 and 1; it is
+        1 where nothing moved.
+        """
         way = report.new.u - report.old.u
         here = report.balance.u - report.old.u
         both, square = self.space.comm.sum(np.array([here @ way, way @ way]))
         return float(min(max(both / square, 0.0), 1.0)) if square > 0.0 else 1.0
 
     def _sum(
-        self, motion: Sequence[Array], at: Callable[..., Any], contact: State | Balance
+        self, motion: Sequence[Array], evaluate_at: Callable[..., Any], contact: State | Balance
     ) -> Array:
-        """Return the numbers for nodal u, v, a (owned, d), less contact forces on held ones.
-
-        ``at`` evaluates functions.
+        """Return the works (count,) of all ranks, less contact forces on held nodes. Collective.
 
         Args:
             motion: nodal u, v, a (owned, d).
-            at: evaluates a function of time at that of the step.
+            evaluate_at: takes a function of time, and returns its value in the step.
             contact: a state or balance with the contact forces.
         """
+        # contact forces on held nodes, whose motion r moves the obstacles of conditions, reach no
+        # cell of theirs
         total = np.zeros(self._count)
         r_t = 0.0 if contact.r_t is None else contact.r_t
         for k, (towards, along) in enumerate(self._direct):
             total[k] = towards @ contact.r_n - np.sum(along * r_t)
-        for matrix, x in zip(
-            self._matrices, [*motion, *(at(one.follow) for one in self._initial)], strict=False
-        ):
+        # (K r)ᵀu + (C r)ᵀv + (M r)ᵀa - rᵀf_0 - rᵀf
+        factors = [*motion, *(evaluate_at(strains.follow) for strains in self._initial)]
+        for matrix, x in zip(self._matrices, factors, strict=False):
             if matrix is not None:
                 total += matrix @ x.ravel()
         for k, load in enumerate(self._loads):
-            total -= self._of_load(k, load, at)
+            total -= self._load_work(k, load, evaluate_at)
         return self.space.comm.sum(total)
 
-    def _of_load(self, k: int, load: Any, at: Callable[[Callable[[float], Any]], Any]) -> Array:
+    def _load_work(
+        self, k: int, load: Any, evaluate_at: Callable[[Callable[[float], Any]], Any]
+    ) -> Array:
         """Return rᵀf on this rank, (count,); what does not change with time is evaluated once.
 
         Args:
             k: the number of the load.
             load: the load.
-            at: evaluates a function of time at that of the step.
+            evaluate_at: takes a function of time, and returns its value in the step.
         """
 
         def work(t: float) -> Array:
@@ -278,23 +312,27 @@ class NodalWork:
             return np.asarray(self._matrices[len(self._forms) + k] @ values.ravel())
 
         if load.history is None and not load.is_constant:
-            return np.asarray(at(work))
+            return np.asarray(evaluate_at(work))
         if k not in self._still:
             self._still[k] = work(0.0)
-        return (
-            self._still[k]
-            if load.history is None
-            else np.asarray(at(load.history) * self._still[k])
-        )
+        if load.history is None:
+            return self._still[k]
+        return np.asarray(evaluate_at(load.history) * self._still[k])
 
 
 def rigid_motions(points: Array, centre: Array) -> Array:
-    """Return (motions, k, d) unit translations and rotations of points (k, d).
+    """Return the unit translations and rotations of points, (motions, k, d).
 
-    The rotations are about a centre of the points; on a line there are none.
+    Args:
+        points: (k, d) [m].
+        centre: (d,) of the rotations [m]; on a line there are none.
     """
     d = points.shape[1]
     arms = points - centre
     shifts = [np.tile(axis, (len(points), 1)) for axis in np.eye(d)]
-    turns = [np.column_stack([-arms[:, 1], arms[:, 0]])] if d == 2 else []
-    return np.array([*shifts, *turns, *(np.cross(axis, arms) for axis in np.eye(3) if d == 3)])
+    turns = []
+    if d == 2:
+        turns = [np.column_stack([-arms[:, 1], arms[:, 0]])]
+    if d == 3:
+        turns = [np.cross(axis, arms) for axis in np.eye(3)]
+    return np.array([*shifts, *turns])

@@ -30,9 +30,14 @@ def longest_edge(mesh: Any, cells: Indices) -> float:
 
 
 def facets_with_cells(mesh: Any, facets: Indices) -> tuple[Array, Array, Indices]:
-    """Return middles (k, d), mean distances of their corners (k,) [m] and cells (k,) of facets.
+    """Return where facets are, how large they are, and the cells beside them.
 
-    They are those local facets whose cell this rank owns.
+    Args:
+        mesh: the mesh.
+        facets: local facets; those whose cell this rank does not own are left out.
+
+    Returns:
+        (k, d) their middles [m], (k,) mean distances of their corners [m], (k,) local cells.
     """
     tdim = mesh.topology.dim
     cell_of = mesh.topology.connectivity(tdim - 1, tdim)
@@ -49,44 +54,56 @@ def facets_with_cells(mesh: Any, facets: Indices) -> tuple[Array, Array, Indices
 def outline(
     space: FemSpace, tags: Mapping[str, Any], regions: Sequence[Indices]
 ) -> list[dict[str, Any]]:
-    """Return on rank 0 the lines (x0, y0, x1, y1) [m] of the boundary and its groups. Collective.
+    """Return the lines that draw a body, the same on any number of ranks. Collective.
 
-    They are those of the boundary, group "", and of each group of it; in space and on a line the
-    edges of a box around each region of local cells. The same on any ranks.
+    In the plane these are the facets of the boundary and of its groups; in space and on a line the
+    edges of a box round each region.
 
     Args:
         space: the body's unknowns.
         tags: groups by name.
         regions: local cells of each region.
+
+    Returns:
+        on rank 0 a group with the lines [x0, y0, x1, y1] [m] (in space six numbers, on a line two)
+        for each: "" for the boundary and for boxes, else the name of the group.
     """
+    if space.dimension != 2:
+        return [_draw_box(space, cells) for cells in regions]
     mesh = space.mesh
-    d = space.dimension
-    if d != 2:
-        edges = [(i, i | 1 << c) for i in range(2**d) for c in range(d) if not i >> c & 1]
-        points = [
-            mesh.geometry.x[compat.geometry_dofmap(mesh)[cells]].reshape(-1, 3) for cells in regions
-        ]
-        boxes = [
-            [
-                -space.comm.max(np.max(-one, axis=0, initial=-np.inf)),
-                space.comm.max(np.max(one, axis=0, initial=-np.inf)),
-            ]
-            for one in points
-        ]
-        return [
-            {
-                "group": "",
-                "lines": [[box[i >> c & 1][c] for i in ends for c in range(d)] for ends in edges],
-            }
-            for box in boxes
-        ]
-    found = []
     boundary = Facets.where("", mesh, lambda x: np.ones(x.shape[1], dtype=bool))
-    for one in (boundary, *(one for one in tags.values() if isinstance(one, Facets))):
-        own = one.indices[one.indices < mesh.topology.index_map(1).size_local]
+    groups = [boundary, *(group for group in tags.values() if isinstance(group, Facets))]
+    drawn = []
+    for group in groups:
+        # each facet is drawn by its owner, with the end of least coordinates first
+        own = group.indices[group.indices < mesh.topology.index_map(1).size_local]
         corners = mesh.geometry.x[compat.entities_to_geometry(mesh, 1, own)][..., :2].tolist()
-        parts = (
-            mesh.comm.gather([[x for end in sorted(ends) for x in end] for ends in corners]) or []
-        )
-        found.append({"group": one.name, "lines": sorted(line for part in parts for line in part)})
-    return found
+        lines = []
+        for ends in corners:
+            first, second = sorted(ends)
+            lines.append([*first, *second])
+        parts = mesh.comm.gather(lines) or []
+        drawn.append({"group": group.name, "lines": sorted(sum(parts, []))})
+    return drawn
+
+
+def _draw_box(space: FemSpace, cells: Indices) -> dict[str, Any]:
+    """Return the edges of the box round local cells of all ranks, as ``outline`` does. Collective.
+
+    Corner i of the box has the upper end of axis c where bit c of i is set, and an edge goes from a
+    corner to another one with one bit more.
+    """
+    d = space.dimension
+    mesh = space.mesh
+    points = mesh.geometry.x[compat.geometry_dofmap(mesh)[cells]].reshape(-1, 3)
+    low = -space.comm.max(np.max(-points, axis=0, initial=-np.inf))
+    high = space.comm.max(np.max(points, axis=0, initial=-np.inf))
+    corners = []
+    for i in range(2**d):
+        corners.append([(high if i >> c & 1 else low)[c] for c in range(d)])
+    lines = []
+    for i in range(2**d):
+        for c in range(d):
+            if not i >> c & 1:
+                lines.append([*corners[i], *corners[i | 1 << c]])
+    return {"group": "", "lines": lines}

@@ -17,6 +17,7 @@ import numpy as np
 from ...core.algebra import Array, SerialComm
 from ...core.errors import InputError
 from ...core.problem import ContactProblem
+from ...core.state_checks import initial_state
 from ...core.step import Scheme, State
 from ...core.surfaces import empty_surface
 from ...core.system import Load
@@ -72,10 +73,13 @@ class CompanionRun:
         if isinstance(dt, Schedule):
             *pieces, (last_step, _) = dt.pieces
             dt = Schedule((*pieces, (last_step, inf)))
+        # A run that begins with a state of its own is not searched for loose bodies: a companion is
+        # made here and not by the user, and is meant to move freely.
+        problem = self._problem
         self._steps: Iterator[tuple[State, Any]] = march(
-            self._problem, scheme=scheme, dt=dt, steps=LARGEST
+            problem, scheme=scheme, dt=dt, steps=LARGEST, state=initial_state(problem)
         )
-        system = self._problem.system
+        system = problem.system
         self._t = [0.0]
         self._u = [system.u0.copy()]
         self._v = [system.v0.copy()]

@@ -24,7 +24,7 @@ from ....core.own_files import inner_folder, is_own, make_inner_folder, read_tex
 from ....core.problem import ContactProblem
 from ....core.state_checks import initial_state
 from ....core.step import State
-from ....fem.body.released_supports import release, removed_support, same_supports, started
+from ....fem.body.released_supports import begin_from, find_removed_support, release, same_supports
 from ....fem.mesh.communicators import MpiComm
 from ....run.files.checkpoint import read_state_checksum
 from ....run.files.folder import (
@@ -262,12 +262,10 @@ def _enter(stage: Stage, reached: Reached, comm: Any) -> tuple[Reached, Parts, S
     problem: ContactProblem = stage.case.problem(comm, parts)
     try:
         if same_supports(before, problem) and (stage.static or not reached.static):
-            # Displacements pass on, and velocities to a stage that marches.
-            u = before.cartesian(state.u)
-            v = before.cartesian(state.v)
-            if stage.static:
-                v = 0.0 * v
-            begun, first = started(problem, u, v, state, reached.force)
+            u, v = before.cartesian(state.u), before.cartesian(state.v)
+            begun, first = begin_from(
+                problem, u, 0.0 * v if stage.static else v, state, reached.force
+            )
         elif reached.static:
             begun, first = release(before, state, problem, earlier=reached.earlier)
         else:
@@ -276,7 +274,7 @@ def _enter(stage: Stage, reached: Reached, comm: Any) -> tuple[Reached, Parts, S
                 "the supports of that one between them, or change supports before the motion"
             )
         force = begun.system.load.constant - problem.system.load.constant
-        name, newtons = removed_support(before, begun, np.asarray(force))
+        name, newtons = find_removed_support(before, begun, np.asarray(force))
         if name and not stage.release:
             raise InputError(
                 f"it removes the support '{name}', which carries {newtons:.4g} N: give release = "
