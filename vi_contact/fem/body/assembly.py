@@ -52,7 +52,7 @@ from .elimination import Elimination
 from .forms import ElasticForms, Materials, cell_materials
 from .initial_strains import InitialStrain, InitialStrains
 from .linear_forms import AnyLoad, LinearForm, Loads
-from .loads import Prescribed, Support, evaluate
+from .loads import Prescribed, evaluate
 from .own_forms import Forms, OwnForms
 from .space import FemSpace, translations
 from .ties import Tied
@@ -183,7 +183,11 @@ def assemble(
     check_nodes(comm, nodes, degree)
     if nodes.curved:
         refuse_folded(mesh)
-    supports = _make_supports(mesh, V, conditions.held)
+    # what conditions hold of the owned blocks of the displacement's space
+    places = [compat.locate_owned_blocks(V, held.facets.indices) for held in conditions.held]
+    supports = []
+    for held, on_facets in zip(conditions.held, places, strict=True):
+        supports.append(held.support(on_facets, mesh.geometry.dim))
     if bcs:
         supports += [values.support(nodes.owned) for values in read_values(mesh, V, bcs)]
     space = FemSpace(
@@ -201,7 +205,13 @@ def assemble(
     else:
         body = OwnForms(space, forms, materials, section, damping)
     body.boundaries = conditions.dashpots
-    check_ratios(body, forms is None)
+    check_ratios(
+        damping,
+        [given for _, given in materials],
+        conditions.dashpots,
+        ratio=body.largest_ratio,
+        damps=body.law_damps,
+    )
     algebra = algebra_for(space.comm.mpi, space.dimension, space.unknowns, symmetric=body.symmetric)
     absorbers = [DashpotMatrix(space, body, boundary) for boundary in conditions.dashpots]
     acting: list[Any] = [absorber.dashpots.loads(absorber, body) for absorber in absorbers]
@@ -254,21 +264,6 @@ def assemble(
     del absorbers, reduced
     give_back(mesh.comm)
     return system
-
-
-def _make_supports(mesh: Mesh, V: Any, held: Sequence[Prescribed]) -> list[Support]:
-    """Return what conditions hold of the owned blocks of a displacement's space. Collective.
-
-    Args:
-        mesh: that of the body.
-        V: the displacement's space.
-        held: what is clamped or prescribed.
-    """
-    blocks = [compat.locate_owned_blocks(V, condition.facets.indices) for condition in held]
-    return [
-        condition.support(on_facets, mesh.geometry.dim)
-        for condition, on_facets in zip(held, blocks, strict=True)
-    ]
 
 
 @dataclass(frozen=True, eq=False)

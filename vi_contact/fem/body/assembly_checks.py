@@ -31,7 +31,7 @@ from ..mesh.communicators import MpiComm
 from ..mesh.group_checks import cells_of, check_field
 from ..mesh.numbering import NodeTable
 from .form_checks import refuse_complex
-from .forms import KINDS, ElasticForms
+from .forms import KINDS
 from .own_forms import Forms
 
 log = logging.getLogger(__name__)
@@ -175,25 +175,29 @@ def _check_damping(damping: Any, section: Any, forms: Any) -> None:
         )
 
 
-def check_ratios(body: ElasticForms, of_materials: bool) -> None:
+def check_ratios(
+    law: Damping,
+    materials: Sequence[Any],
+    boundaries: Sequence[Any],
+    *,
+    ratio: float,
+    damps: bool,
+) -> None:
     """Raise InputError, on all ranks, for a law that damps nothing, and for ratios no law reads.
 
     Args:
-        body: the forms of a body, with its dashpots.
-        of_materials: whether its stiffness and mass are those of materials, and not the user's own
-            forms.
+        law: the damping of the body.
+        materials: those of its cells.
+        boundaries: its dashpots.
+        ratio: the largest damping ratio of the materials, over all ranks [-].
+        damps: whether the law makes any C at all.
     """
-    law = body.damping
-    ratio = body.largest_ratio
-    if isinstance(law, DampingRatio) and not any(
-        callable(given.xi) or given.xi for _, given in body.materials
-    ):
+    has_ratio = any(callable(material.xi) or material.xi for material in materials)
+    if isinstance(law, DampingRatio) and not has_ratio:
         raise InputError(
             f"assemble: {law} damps by the ratios xi of the materials, and none of them has one; "
             "give LinearElastic(…, xi=0.05), or another law, such as Rayleigh(alpha, beta)"
         )
-    rayleigh = isinstance(law, Rayleigh) and (law.alpha > 0.0 or law.beta > 0.0)
-    damps = body.damped if of_materials else rayleigh or body.viscous is not None
     if not isinstance(law, NoDamping | DampingRatio) and not damps:
         raise InputError(
             f"assemble: {law} damps nothing, as its coefficients are zero; give coefficients above "
@@ -204,18 +208,11 @@ def check_ratios(body: ElasticForms, of_materials: bool) -> None:
             f"assemble: a material has the damping ratio xi = {ratio:g}, which {law} does not "
             "read; give damping=DampingRatio(frequency), or leave xi out"
         )
-    _refuse_ratio_behind(body)
 
-
-def _refuse_ratio_behind(body: ElasticForms) -> None:
-    """Raise InputError for a ratio of a material that only dashpots have.
-
-    They have no damping but their own.
-    """
-    inside = [given for _, given in body.materials]
-    for boundary in body.boundaries:
+    # Dashpots have no damping but their own: a ratio that only they have is read by nobody.
+    for boundary in boundaries:
         behind = boundary.material
-        if behind is not None and behind.xi and behind not in inside:
+        if behind is not None and behind.xi and behind not in materials:
             raise InputError(
                 f"assemble: the material of {type(boundary).__name__} on '{boundary.facets.name}' "
                 f"has the damping ratio xi = {behind.xi:g}, and dashpots read none; leave xi out "

@@ -45,6 +45,7 @@ class ElasticForms:
         damping: the law of C, as it was given.
         largest_ratio: the largest xi of the materials, on all ranks.
         damped: whether there is a C.
+        law_damps: whether the law of damping makes any of it.
         densities: whether ``fields`` tell the mass and its damping, cell by cell.
         materials: (local cells, material) as they were given.
         dilatation: with ``selective``, the mean of tr eps over each cell, which takes its place in
@@ -109,6 +110,7 @@ class ElasticForms:
         for constants in values:
             damped = damped or any(np.any(share) for share in damping.coefficients(constants))
         self.damped = bool(largest(space.comm, damped))
+        self.law_damps = self.damped
         ratios = [
             _largest_ratio(constants.xi, where)
             for constants, where in zip(values, dofs, strict=True)

@@ -100,7 +100,8 @@ class OwnForms(ElasticForms):
         # C = alpha M + beta K + viscous stresses + the user's own, of which any may be missing
         rayleigh = damping if isinstance(damping, Rayleigh) else Rayleigh(0.0, 0.0)
         shares = {"M": rayleigh.alpha, "K": rayleigh.beta}
-        self.damped = given.damping is not None or any(shares.values()) or self.viscous is not None
+        self.law_damps = any(shares.values()) or self.viscous is not None
+        self.damped = self.law_damps or given.damping is not None
         if given.stress is not None:
             refuse_stress(given.stress, space)
         self._forms = {
