@@ -47,6 +47,8 @@ LINES: Mapping[str, Sequence[tuple[str, ...]]] = {
             "steps_in_contact",
         ),
         ("smallest gap", "{smallest_gap:.3e} m", "steps_in_contact"),
+        ("friction used, T/(mu N)", "{used}", "used"),
+        ("closed points that slip", "{slid}", "slid"),
     ),
     "energy": (
         ("", "  energy ledger [J]", "energy"),
@@ -221,7 +223,17 @@ def _words_of(facts: Mapping[str, Any]) -> dict[str, Any]:
         "and_output": ", output and the cross-check" if facts["cross_check"] else " and output",
         "halved_steps": facts["halved_steps"] or None,
         "reason": facts["reason"] or None,
+        "used": _share_in_words(facts.get("friction_used")),
+        "slid": _share_in_words(facts.get("slipping")),
     }
+
+
+def _share_in_words(share: Mapping[str, float | None] | None) -> str | None:
+    """Return the largest share of a run and the last one in words, None for none."""
+    if share is None or share["largest"] is None:
+        return None
+    end = "open at the end" if share["end"] is None else f"{share['end']:.3f} at the end"
+    return f"{share['largest']:.3f} at most, {end}"
 
 
 def _lines(part: str, words: Mapping[str, Any]) -> list[tuple[str, str]]:
