@@ -113,7 +113,17 @@ class NodalSpace:
         InputError for a point farther from every node than the body is large (5 % of its
         diagonal).
         """
+        return self.find_nearest(points)[0]
+
+    def find_nearest(self, points: Array, *, anywhere: bool = False) -> tuple[Indices, Array]:
+        """Find the nodes as ``find_nodes`` does, and their distances (k,) [m]. Collective.
+
+        Args:
+            points: (k, d) [m].
+            anywhere: whether points far from all nodes are let be.
+        """
         found = np.empty(len(points), dtype=np.int64)
+        distances = np.zeros(len(points))
         for i, point in enumerate(np.atleast_2d(np.asarray(points, dtype=float))):
             if point.shape != (self.dimension,):
                 raise InputError(
@@ -121,7 +131,7 @@ class NodalSpace:
                 )
             distance = np.linalg.norm(self.points - point, axis=1)
             nearest = -largest(self.comm, -np.min(distance, initial=np.inf))
-            if nearest > MEANT * self.size:
+            if nearest > MEANT * self.size and not anywhere:
                 raise InputError(
                     f"point {at(point)} is {nearest:.3g} m away from the nearest node: give a "
                     "point of the body"
@@ -130,7 +140,8 @@ class NodalSpace:
             found[i] = -int(
                 largest(self.comm, -float(np.min(close, initial=np.iinfo(np.int64).max)))
             )
-        return found
+            distances[i] = nearest
+        return found, distances
 
 
 def bounding_box(comm: Comm, points: Array) -> float:
