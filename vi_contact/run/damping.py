@@ -46,6 +46,7 @@ def first_modes(problem: ContactProblem) -> FirstModes:
     They are found once for a system and a surface. Collective.
     """
     check_problem_given("first_modes", problem)
+    problem.system.refuse_statics_only("first_modes")
     surface, frictional = problem.surface, problem.frictional
     known: list[tuple[Any, bool, FirstModes]] = problem.system.cached(KNOWN, list)
     for one, rubbing, modes in known:

@@ -95,6 +95,7 @@ def choose_method(
         },
     )
     check_methods(owner, *solvers, tolerance)
+    problem.system.refuse_statics_only(owner)
     problem, scheme = with_defaults(problem, scheme)
     first, escalation = solvers
     if first is None:

@@ -28,6 +28,7 @@ def lowest_frequency(
     deterministic, and not orthogonal to the first mode of structures that a base motion can excite.
     Raises InputError for a floating body (K singular) and when the iteration does not settle.
     """
+    system.refuse_statics_only("lowest_frequency")
     if system.floating:
         raise InputError(
             "the body is not held, so its lowest frequency is zero: clamp a part of it"

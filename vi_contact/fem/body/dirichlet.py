@@ -183,7 +183,7 @@ def refuse_contradictions(space: Any) -> None:
         values[support.places] = support.at(space.points, 0.0, 0)[0]
     for i, j in product(np.flatnonzero(~given), np.flatnonzero(given)):
         stated = space.prescribed[i]
-        moves = stated.moves and callable(stated.displacement)
+        moves = stated.moves and callable(stated.motions[0])
         apart = np.abs(held[i] - held[j])
         # components that both hold, and all of each: one is a part of the other
         both, *each = space.comm.sum(

@@ -57,6 +57,7 @@ class ElasticForms:
     initial: Any = None  # InitialStrains
     densities = tells_stress = symmetric = True
     own_damping = False
+    statics_only = False
     notes: tuple[str, ...] = ()
 
     def __init__(

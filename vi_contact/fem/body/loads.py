@@ -16,11 +16,18 @@ import ufl
 from dolfinx.mesh import Mesh
 
 from ...core.algebra import Array, Comm, Indices
-from ...core.checks import explain_error, function, number, optional, refuse, shown
+from ...core.checks import explain_error, function, number, optional, refuse, several, shown
+from ...core.errors import InputError
 from ...core.quantities import Unit
 from .. import compat
-from ..mesh.group_checks import components_given, components_of, facets_of, field_given
-from ..mesh.tagged_mesh import Facets
+from ..mesh.group_checks import (
+    cells_of,
+    components_given,
+    components_of,
+    facets_of,
+    field_given,
+)
+from ..mesh.tagged_mesh import Cells, Facets
 
 Field = Callable[[Array, float], Array]
 Value = tuple[float, ...] | Field
@@ -85,6 +92,25 @@ def _zero(points: Array, t: float) -> Array:
 
 
 @dataclass(frozen=True)
+class _Scaled:
+    """Multiply a field constant in time by a function of the time.
+
+    Attributes:
+        value: (d,) numbers, or a function of points, asked at t = 0.
+        given: f(t).
+    """
+
+    value: Value
+    given: Callable[[float], float]
+
+    def __call__(self, points: Array, t: float) -> Array:
+        """Return f(t) times the field at points (k, d)."""
+        value = self.value
+        field = value(points, 0.0) if callable(value) else np.tile(value, (len(points), 1))
+        return float(self.given(t)) * np.asarray(field)
+
+
+@dataclass(frozen=True)
 class Prescribed:
     """Prescribe u_i = U_i(x, t) on facets, with the velocity and acceleration of the same motion.
 
@@ -92,6 +118,11 @@ class Prescribed:
     free (rollers). The mass and damping of the boundary nodes enter the equations, so all three
     time functions are needed; left out they are zero (a clamped part, or a displacement constant in
     time).
+
+    ``history``: a factor f(t) of a displacement constant in time, U = f(t) U_0(x), as that of
+    loads. One function is enough for load steps, which ask for no rates; for motion in time give
+    three, (f, f', f''), which make U' = f' U_0 and U'' = f'' U_0 as well. A displacement that is a
+    function is then asked once, at t = 0.
     """
 
     facets: Facets
@@ -99,12 +130,43 @@ class Prescribed:
     velocity: Annotated[Value, Unit("m/s")] = _zero
     acceleration: Annotated[Value, Unit("m/s²")] = _zero
     components: tuple[int, ...] | None = None
+    history: Callable[[float], float] | tuple[Callable[[float], float], ...] | None = None
 
     def __post_init__(self) -> None:
         facets_of("Prescribed", "facets", self.facets)
         for name in ("displacement", "velocity", "acceleration"):
             field_given("Prescribed", name, getattr(self, name))
         components_given("Prescribed", self.components)
+        if self.history is not None:
+            self._check_history()
+
+    def _check_history(self) -> None:
+        """Raise InputError for a history that is no function or three, or has nothing to turn."""
+        remedy = "give a function f of the time [s], or three, (f, f', f'')"
+        for one in self._histories(remedy):
+            function("Prescribed", "history", one, remedy)
+        if self.displacement is _zero:
+            raise InputError(
+                "Prescribed: history is a factor of the displacement, which is left out; give it"
+            )
+        if self.velocity is not _zero or self.acceleration is not _zero:
+            raise InputError(
+                "Prescribed has a history, and a velocity or an acceleration of its own; give "
+                "history=(f, f', f'') in their place"
+            )
+
+    def _histories(self, remedy: str) -> tuple[Any, ...]:
+        """Return f, or f, f' and f''; InputError, which ends with the remedy, for another number.
+
+        Args:
+            remedy: what to give instead.
+        """
+        if callable(self.history):
+            return (self.history,)
+        histories = several("Prescribed", "history", self.history, remedy)
+        if len(histories) != 3:
+            raise InputError(f"Prescribed: history has {len(histories)} members; {remedy}")
+        return histories
 
     @property
     def name(self) -> str:
@@ -114,7 +176,10 @@ class Prescribed:
     @property
     def motions(self) -> tuple[Value, Value, Value]:
         """Return the motion and its rates (U, U', U'')."""
-        return self.displacement, self.velocity, self.acceleration
+        if self.history is None:
+            return self.displacement, self.velocity, self.acceleration
+        scaled = [_Scaled(self.displacement, one) for one in self._histories("give three")]
+        return (*scaled, _zero, _zero)[:3]  # type: ignore[return-value]  # three are cut out
 
     @property
     def moves(self) -> bool:
@@ -323,8 +388,21 @@ class Pressure(Traction):
 class BodyForce(ActingLoad):
     """Apply a volume force f_i(x, t) [N/m³].
 
-    The weight of a material is BodyForce((0, -rho * 9.80665)).
+    The weight of a material is BodyForce((0, -rho * 9.80665)). ``cells``: the group of cells on
+    which it acts; all of the mesh when None.
     """
 
     value: Annotated[Value, Unit("N/m³")]
     history: Callable[[float], float] | None = None
+    cells: Cells | None = None
+
+    def __post_init__(self) -> None:
+        optional(cells_of, "BodyForce", "cells", self.cells)
+        super().__post_init__()
+
+    def measure(self, mesh: Mesh) -> Any:
+        """Return the measure of the cells."""
+        if self.cells is None:
+            return ufl.dx
+        cells = cells_of("BodyForce", "cells", self.cells, mesh)
+        return compat.measure(mesh, mesh.topology.dim, cells.indices)

@@ -59,6 +59,7 @@ class BodyMomenta:
             InputError: a group where the system has no cells, a body that does not exist, and
                 what has no mass.
         """
+        problem.system.refuse_statics_only(owner)
         comm = problem.system.algebra.comm
         space = problem.system.space
         self._problem = problem

@@ -44,6 +44,8 @@ def work_beyond(
         load: a traction or body force, None for ``density`` alone.
     """
     d = space.dimension
+    if isinstance(load, BodyForce) and load.cells is not None:  # it acts on these alone
+        crossed = crossed & np.isin(np.arange(len(crossed)), load.cells.indices)
     cells, nodes = _entities(
         space.mesh, crossed, load.facets.indices if isinstance(load, Traction) else None
     )

@@ -84,6 +84,8 @@ class NodalWork:
             raise InputError(
                 f"gravity has {self._gravity.size} components: give {space.dimension} numbers"
             )
+        if self._gravity.any():
+            problem.system.refuse_statics_only("gravity=")
         self._r = compat.function(space.V)
         self._inside = compat.function(compat.cell_space(space.mesh))
         self._forms = [
