@@ -464,3 +464,12 @@ def constrains(bc: Any, space: Any) -> bool:
 def evaluate(field: Any, point: Any, cell: int) -> npt.NDArray[np.float64]:
     """Return the components of a function at a point (3,) [m] in a local cell, (bs,)."""
     return np.asarray(field.eval(np.reshape(point, (1, 3)), [cell]), dtype=float).ravel()
+
+
+def continuous(space: Any) -> bool:
+    """Say whether the fields of a space do not jump between cells."""
+    element = space.ufl_element()
+    if not _BASIX_ELEMENTS:  # of vectors it is the one of their components that knows
+        parts = element.sub_elements()
+        element = parts[0] if parts else element
+    return element in ufl.H1

@@ -98,7 +98,7 @@ class Solution:
         frame: int | None = None,
         continuous: bool = False,
     ) -> Any:
-        """Return "u", "v", "stress" or "contact_pressure" as a DOLFINx Function. Collective.
+        """Return "u", "v", "stress", "contact_pressure", … as a DOLFINx Function. Collective.
 
         It is ``fem.as_function`` of the end state, or ``fem.read_function`` of a frame in the run
         folder.

@@ -13,15 +13,17 @@ closed nodes stick.
 import logging
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import numpy as np
 
 from ...core.algebra import Array, Indices, Mask, from_each, on_first
 from ...core.arguments import check_fields
+from ...core.checks import column_name
+from ...core.errors import InputError
 from ...core.files import (
     FIELDS,
     FIELDS_INDEX,
@@ -39,6 +41,9 @@ from ...core.quantities import Positive
 from ...core.step import Report, State
 from ..matrices.own_matrices import MatrixSpace
 from ..mesh.nodal_space import NodalSpace
+
+if TYPE_CHECKING:
+    from .own_functions import OwnFunctions
 
 log = logging.getLogger(__name__)
 
@@ -100,6 +105,7 @@ _CELLS = {
 
 _VECTORS = ("u", "v", "a")
 _RUBBING = ("contact_traction_t", "slip")
+TAKEN = (*_VECTORS, *_RUBBING, "contact_pressure", "contact_status", "von_mises")
 
 
 @dataclass(frozen=True)
@@ -108,13 +114,26 @@ class XDMF:
 
     ``frames_per_file``: each time so many frames have files of their own they are put into one:
     some systems want few.
+
+    ``functions``: name -> a DOLFINx Function of the user's on the mesh of the body, which every
+    frame has with the values of its moment; or a function of the state (``State``) that returns
+    one. It is of a continuous Lagrange space, interpolated at the nodes, or constant in each cell;
+    a number, a vector or a tensor.
     """
 
     every: Annotated[int, Positive] = 10
     frames_per_file: Annotated[int, Positive] = 1
+    functions: Mapping[str, Any] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
         check_fields(self)
+        for name in self.functions:
+            column_name("name of a Function", name)
+            if name in TAKEN:
+                raise InputError(
+                    f"XDMF: functions has the name '{name}', which frames have already; give "
+                    "another"
+                )
 
     def open(
         self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]
@@ -124,11 +143,21 @@ class XDMF:
         Collective.
         """
         space = problem.system.space
+        own = None
         if isinstance(space, MatrixSpace):
+            if self.functions:
+                raise InputError(
+                    "XDMF: functions are on a mesh, and the system was not made of one; leave them "
+                    "out"
+                )
             cells = Cells("Polyvertex", space.nodes[:, None], space.nodes)
         else:
+            from .own_functions import OwnFunctions  # late: the other frames need no DOLFINx
+
             cells = _cells_of_body(problem)
-        return FrameWriter(problem, folder, kept, self.frames_per_file, cells)
+            if self.functions:
+                own = OwnFunctions(problem, self.functions)
+        return FrameWriter(problem, folder, kept, self.frames_per_file, cells, own)
 
 
 @dataclass(frozen=True)
@@ -154,7 +183,18 @@ class FrameWriter:
         kept: Mapping[int, float],
         per_file: int,
         shown: Cells,
+        own: "OwnFunctions | None" = None,
     ) -> None:
+        """Write mesh and index. Collective.
+
+        Args:
+            problem: whose states they are.
+            folder: that of the run.
+            kept: step -> time [s] of frames that are there and stay.
+            per_file: how many frames a file has in the end.
+            shown: the cells.
+            own: the user's Functions, None without.
+        """
         space: Any = problem.system.space
         self._problem = problem
         self._space = space
@@ -164,6 +204,8 @@ class FrameWriter:
         self._type = shown.kind
         self._cell_numbers = shown.numbers
         self._von_mises = shown.von_mises
+        self._own = own
+        self._has: dict[int, list[str]] = {}
         points = on_first(space.comm, space.nodes, _three(space.points))
         cells = on_first(space.comm, self._cell_numbers, shown.nodes)
         self._shape = (len(points), *cells.shape)
@@ -231,28 +273,26 @@ class FrameWriter:
             problem, state, np.where(state.active, np.where(slipping, 3, 2), 1)
         )
         if problem.frictional:
-            moving += [between(problem, nodal) for nodal in self._rubbing(state)]
+            moving += [between(problem, nodal) for nodal in nodal_rubbing(problem, state)]
         rows = np.hstack([*(_three(nodal) for nodal in moving), pressure, status])
+        own = {} if self._own is None else self._own.values(state)
         on_root(
-            space.comm, partial(self._write, state, on_first(space.comm, space.nodes, rows), stress)
+            space.comm,
+            partial(self._write, state, on_first(space.comm, space.nodes, rows), stress, own),
         )
 
-    def _rubbing(self, state: State) -> list[Array]:
-        """Tangential traction and slip at the owned nodes, (k, d) each."""
-        surface = self._problem.surface
-        slip = surface.slip(state.u, state.t)
-        r_t = np.zeros_like(slip) if state.r_t is None else state.r_t
-        return [self._along_axes(values) for values in (r_t / surface.weights[:, None], slip)]
+    def _write(
+        self, state: State, nodal: Array, stress: Array | None, own: Mapping[str, Array]
+    ) -> None:
+        """Write a frame and the index, on rank 0.
 
-    def _along_axes(self, tangential: Array) -> Array:
-        """Components (m, d - 1) in nodal tangents as vectors at the owned nodes."""
-        space = self._space
-        surface = self._problem.surface
-        turned = surface.reaction_load(np.zeros(surface.count), len(space.ids), tangential)
-        along = surface.along_axes(turned)  # tangents are at right angles to all that is oblique
-        return NodalSpace.expand(space, along, 0.0)  # not what is prescribed or follows
+        Args:
+            state: whose frame it is.
+            nodal: (nodes, columns) all that nodes have.
+            stress: (cells,) von Mises stresses [Pa], None without.
+            own: the user's values by name, (nodes or cells, components).
+        """
 
-    def _write(self, state: State, nodal: Array, stress: Array | None) -> None:
         def fill(file: Any) -> None:
             for i, name in enumerate(self._names):
                 file[name] = nodal[:, 3 * i : 3 * i + 3]
@@ -260,11 +300,14 @@ class FrameWriter:
             file["contact_status"] = nodal[:, -1].astype(np.int32)
             if stress is not None:
                 file["von_mises"] = stress
+            for name, values in own.items():
+                file[name] = values
 
         path = inner_folder(self._folder, FIELDS) / f"frame_{state.k:06d}.h5"
         hdf5_atomically(path, fill)
         self._times[state.k] = state.t
         self._places[state.k] = (path, "/")
+        self._has[state.k] = list(own)
         single = [k for k, (_, group) in self._places.items() if group == "/"]
         full = len(single) >= self._per_file > 1
         if full:
@@ -283,6 +326,20 @@ class FrameWriter:
         )
         write_atomically(self._folder / FIELDS_INDEX, text.encode())
 
+    def _own_names(self, k: int) -> list[str]:
+        """Return which of the user's Functions the frame of a step has.
+
+        One of an earlier run, which this one goes on with, may have none.
+        """
+        if self._own is None:
+            return []
+        if k not in self._has:
+            path, group = self._places[k]
+            with open_hdf5(path) as file:
+                self._has[k] = [name for name in self._own.names if name in file[group]]
+        # what the user's function of the state returns is known from its first frame on
+        return [name for name in self._has[k] if name in self._own.kinds]
+
     def _grid(self, k: int, t: float) -> str:
         nodes, cells, corners = self._shape
         path, group = self._places[k]
@@ -292,7 +349,8 @@ class FrameWriter:
         def attribute(
             name: str, center: str, *shape: int, number: str = "Float", size: int = 8
         ) -> str:
-            kind = "Vector" if len(shape) == 2 else "Scalar"
+            kind = {1: "Scalar", 2: "Vector"}.get(len(shape), "Tensor")
+            kind = "Tensor" if shape[1:] == (9,) else kind
             item = _item(shape, f"{frame}/{name}", number, size)
             return (
                 f'<Attribute Name="{name}" AttributeType="{kind}" '
@@ -304,6 +362,10 @@ class FrameWriter:
         attributes.append(attribute("contact_status", "Node", nodes, number="Int", size=4))
         if self._von_mises is not None:
             attributes.append(attribute("von_mises", "Cell", cells))
+        for name in self._own_names(k):
+            about = self._own.kinds[name]
+            shape = (cells if about.in_cells else nodes, *about.components)
+            attributes.append(attribute(name, "Cell" if about.in_cells else "Node", *shape))
         return (
             f'<Grid Name="step {k}" GridType="Uniform"><Time Value="{t!r}"/>\n'
             f'<Topology TopologyType="{self._type}" NumberOfElements="{cells}" '
@@ -334,6 +396,41 @@ def nodal_contact(problem: ContactProblem, state: State, status: Array) -> tuple
     pressure[blocks[order], 0] = each[order]
     np.maximum.at(highest[:, 0], blocks, status)
     return between(problem, pressure), between(problem, highest, np.min)
+
+
+def nodal_rubbing(problem: ContactProblem, state: State) -> tuple[Array, Array]:
+    """Return tangential traction [Pa] and slip [m] along the axes at the owned nodes, (k, d) each.
+
+    The traction is that of the body on its support; both are zero off the contact surface.
+    """
+    surface = problem.surface
+    slip = surface.slip(state.u, state.t)
+    r_t = np.zeros_like(slip) if state.r_t is None else state.r_t
+    traction = _nodal_tangential(problem, r_t / surface.weights[:, None])
+    return traction, _nodal_tangential(problem, slip)
+
+
+def _nodal_tangential(problem: ContactProblem, tangential: Array) -> Array:
+    """Return components (m, d - 1) in nodal tangents as vectors (k, d) at the owned nodes."""
+    space = cast(NodalSpace, problem.system.space)
+    surface = problem.surface
+    turned = surface.reaction_load(np.zeros(surface.count), len(space.ids), tangential)
+    along = surface.along_axes(turned)  # tangents are at right angles to all that is oblique
+    return NodalSpace.expand(space, along, 0.0)  # not what is prescribed or follows
+
+
+def nodal_gap(problem: ContactProblem, state: State) -> Array:
+    """Return the gap [m] at the owned nodes, (k, 1): of several faces the smallest. Collective.
+
+    It is zero off the contact surface, and at nodes without a condition.
+    """
+    space = cast(NodalSpace, problem.system.space)
+    surface = problem.surface
+    each = surface.gap(state.t) - surface.normal_values(state.u) + surface.compliance * state.r_n
+    gap = np.full((len(space.nodes), 1), np.inf)
+    np.minimum.at(gap[:, 0], blocks_of_conditions(problem), each)
+    gap[~np.isfinite(gap)] = 0.0
+    return between(problem, gap)
 
 
 def blocks_of_conditions(problem: ContactProblem) -> Indices:

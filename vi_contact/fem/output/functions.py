@@ -30,9 +30,15 @@ from ...core.state_checks import check_problem_given, check_sizes
 from ...core.step import State
 from .. import compat
 from ..body.space import FemSpace, known_matrices, space_of
-from .fields import between, blocks_of_conditions, nodal_contact
+from .fields import (
+    between,
+    blocks_of_conditions,
+    nodal_contact,
+    nodal_gap,
+    nodal_rubbing,
+)
 
-NAMES = ("u", "v", "stress", "contact_pressure")
+NAMES = ("u", "v", "stress", "contact_pressure", "contact_traction_t", "slip", "contact_gap")
 ACCURACY = 1e-13  # of a projection, in its residual
 SAME = 1e-9  # of the size of the mesh, and of the longest time
 
@@ -42,11 +48,14 @@ def as_function(
 ) -> Any:
     """Return a state as a DOLFINx Function.
 
-    It is "u" [m], "v" [m/s], "stress" [Pa] (d, d) or "contact_pressure" [Pa].
+    It is "u" [m], "v" [m/s], "stress" [Pa] (d, d), "contact_pressure" [Pa], "contact_gap" [m], or
+    a vector along the axes: "contact_traction_t" [Pa], the tangential traction of the body on its
+    support, and "slip" [m], its tangential displacement there. Those of the contact are zero off
+    the contact surface.
 
-    Where a node of the contact boundary has no pressure of its own, as one that is held, the
-    function has the mean of those of its neighbours, so that the error of a right pressure falls
-    with the size of the facets there too.
+    Where a node of the contact boundary has no pressure or traction of its own, as one that is
+    held, the function has the mean of those of its neighbours, so that the error of a right
+    pressure falls with the size of the facets there too. Its gap and slip are zero.
 
     ``state``: of simulate, march, static_equilibrium or quasi_static of this problem.
     ``continuous``: the stress projected onto P1, Q1, P2 or Q2, ∫ sigma_h : tau = ∫ sigma(u) : tau.
@@ -55,7 +64,7 @@ def as_function(
     """
     space = _checked("as_function", problem, name, continuous)
     check_sizes("as_function", problem, state)
-    if name != "contact_pressure":
+    if name in ("u", "v", "stress"):
         x, derivative = (state.v, 1) if name == "v" else (state.u, 0)
         return _function(
             problem,
@@ -64,8 +73,26 @@ def as_function(
             state.t,
             continuous,
         )
-    pressure = nodal_contact(problem, state, np.ones(len(state.r_n)))[0]
-    return _function(problem, name, with_borrowed(problem, pressure)[:, 0], state.t)
+    return _function(problem, name, _of_contact(problem, state, name), state.t)
+
+
+def _of_contact(problem: ContactProblem, state: State, name: str) -> Array:
+    """Return a quantity of the contact at the owned nodes, (k,) or (k, d). Collective.
+
+    Args:
+        problem: the problem.
+        state: a state of it.
+        name: the quantity.
+    """
+    if name == "contact_pressure":
+        pressure = nodal_contact(problem, state, np.ones(len(state.r_n)))[0]
+        return with_borrowed(problem, pressure)[:, 0]
+    if name == "contact_gap":
+        return nodal_gap(problem, state)[:, 0]
+    traction, slip = nodal_rubbing(problem, state)
+    if name == "slip":
+        return between(problem, slip)
+    return with_borrowed(problem, between(problem, traction))
 
 
 def with_borrowed(problem: ContactProblem, pressure: Array) -> Array:
@@ -117,6 +144,10 @@ def read_function(
         int,
         "give its number, 0 for the first and -1 for the last",
     )
+    if name == "contact_gap":
+        raise InputError(
+            "read_function: frames have no gap; give as_function a state, or record Contact()"
+        )
     kind = "u" if name == "stress" else name
     comm = space.comm
     d = space.dimension
@@ -136,6 +167,8 @@ def read_function(
     )
     if name == "contact_pressure":
         return _function(problem, name, with_borrowed(problem, values[space.nodes, None])[:, 0], t)
+    if name == "contact_traction_t":
+        return _function(problem, name, with_borrowed(problem, values[space.nodes, :d]), t)
     return _function(problem, name, values[space.nodes, :d], t, continuous)
 
 
@@ -255,6 +288,11 @@ def _stored(
         )
     try:
         index: Any = ET.fromstring(read_bytes(folder / FIELDS_INDEX))
+        attributes = {one.get("Name") for one in index.iterfind(".//Attribute")}
+        if attributes and name not in attributes:
+            raise InputError(
+                f"the frames in '{folder}' have no '{name}', as those of a run without friction"
+            )
         places = sorted(
             (
                 float(grid.find("Time").get("Value")),
