@@ -14,34 +14,13 @@ from ....core.algebra import Array
 from ....core.quantities import RATIO, Between, Positive
 from ....core.units import STANDARD_GRAVITY
 from .comparison import Check, Formula, Gravity, History, Incline, Length, Numbers
+from .rigid_slip import sliding
 
-# CHOSEN: of a step of the run; a slide ends within one, which costs less than r h²/8 of slip, h =
-# dt/32
-PARTS = 32
 ROUNDED = (
     1e-9  # CHOSEN: share of alpha below which the first tilt is round-off of a block that stands
 )
 # CHOSEN: longest step of the rigid block, over 1/p: its angles are those of shorter steps to 0.1 %
 FINE = 2e-4
-
-
-def sliding(t: Array, drive: Array, resist: Array, *, one_sided: bool = False) -> Array:
-    """Return the displacement [m] at times t (n,) of u'' = w - r sgn(u') from rest.
-
-    It sticks while |w| <= r.
-
-    drive w, resist r >= 0 [m/s²], (n,), linear between the times; one_sided: it never slides back,
-    u' >= 0.
-    """
-    u, slip, speed, share = np.zeros(len(t)), 0.0, 0.0, (np.arange(PARTS) + 0.5) / PARTS
-    for row, length in enumerate(np.diff(t) / PARTS):
-        push, hold = (length * (x[row] + share * (x[row + 1] - x[row])) for x in (drive, resist))
-        for gain, most in zip(push.tolist(), hold.tolist(), strict=True):
-            free = speed + gain
-            new = max(free - most, 0.0) - (0.0 if one_sided else max(-free - most, 0.0))
-            slip, speed = slip + 0.5 * length * (speed + new), new
-        u[row + 1] = slip
-    return u
 
 
 @dataclass(frozen=True, kw_only=True)
