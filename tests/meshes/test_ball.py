@@ -123,7 +123,7 @@ def test_half_ball_stands_on_its_anvil():
     assert -lack < sizes[ball].sum() / (2.0 / 3.0 * pi * RADIUS**3) - 1.0 < 0.0
     assert sizes[block].sum() == pytest.approx(2.0 * anvil**3, rel=1e-12)
     assert not np.intersect1d(mesh.cells[ball], mesh.cells[block]).size
-    wanted = {"surface", "foot", "side_z"} | {
+    wanted = {"surface", "foot", "cap", "side_z"} | {
         f"anvil_{name}" for name in ("top", "foot", "side_z", "far")
     }
     assert set(mesh.facet_groups) == wanted
@@ -140,9 +140,15 @@ def test_half_ball_stands_on_its_anvil():
     assert np.linalg.norm(shell, axis=1).min() < 1e-15  # the lowest point is a node
     foot, below = mesh.facet_groups["foot"], mesh.facet_groups["anvil_foot"]
     assert area(mesh, "foot") == pytest.approx(pi / 2.0 * SMALL["foot"] ** 2, rel=0.1)
-    assert area(mesh, "anvil_foot") > 1.5 * area(mesh, "foot")
-    inner = np.linalg.norm(mesh.points[below].mean(axis=1), axis=1) < SMALL["foot"]
-    assert np.count_nonzero(inner) == pytest.approx(len(foot), rel=0.2)
+    assert area(mesh, "anvil_foot") == pytest.approx(area(mesh, "foot"), rel=0.1)
+    assert area(mesh, "cap") > 2.0 * area(mesh, "foot")
+    assert len(below) == pytest.approx(len(foot), rel=0.2)
+    lifted = arrays_from_script(
+        BallMesh(**SMALL, half=True, anvil=anvil, coarsest=0.15 * RADIUS, height=1e-6)
+    )
+    assert lifted.points[np.unique(lifted.cells[lifted.cell_groups["ball"]]), 1].min() == (
+        pytest.approx(1e-6, rel=1e-9)
+    )
 
 
 def test_quarter_stands_on_a_quarter_of_the_anvil():

@@ -8,7 +8,8 @@ Physical groups: cells "ball"; boundary "surface" (the sphere), "foot" (its part
 the contact side), "side_z" (z = 0), "side_x" (x = 0, not of the half) and, of the eighth, "cut" (y
 = R). The anvil is a block below y = 0, cut by the same planes, a body of its own: cells "anvil";
 boundary "anvil_foot" (its part near the origin), "anvil_top", "anvil_side_z", "anvil_side_x" and
-"anvil_far", the other sides.
+"anvil_far", the other sides; and "cap" of the ball, what may face "anvil_foot". A ball that slides
+along its anvil has the contact direction of the anvil: contact_pair(…, "anvil_foot", "cap").
 """
 
 import math
@@ -20,10 +21,10 @@ import numpy as np
 from vi_contact.core.arguments import check_fields
 from vi_contact.core.checks import MOST_CELLS, counted
 from vi_contact.core.errors import InputError
-from vi_contact.core.quantities import Positive, Unit
+from vi_contact.core.quantities import NotNegative, Positive, Unit
 from vi_contact.meshes.gmsh_session import options
 
-WIDER = 1.6  # CHOSEN: of the foot of the ball: what of the anvil may face it
+WIDER = 1.6  # CHOSEN: of the foot: what of the ball may face that of the anvil
 COARSEST = 0.35  # CHOSEN: of the depth of the anvil, its largest cells
 _TRIANGLE = 2  # Gmsh's number
 _SIZES = {  # the size field alone decides
@@ -47,6 +48,7 @@ class BallMesh:
     `half`: half of the ball, for an oblique impact; else a quarter, or an `eighth`. The half has
     the poles of its sphere in the normal of its plane of symmetry, away from the foot. `anvil`:
     depth [m] of a block below the ball, as far to every side; its cells grow twice as fast.
+    `height` [m] lifts the ball above y = 0.
     """
 
     radius: Annotated[float, Positive, Unit("m")]
@@ -57,6 +59,7 @@ class BallMesh:
     eighth: bool = False
     half: bool = False
     anvil: Annotated[float | None, Unit("m")] = None
+    height: Annotated[float, NotNegative, Unit("m")] = 0.0
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -87,6 +90,9 @@ class BallMesh:
         """Add the ball to Gmsh's current model."""
         model = gmsh.model
         volume = _add_ball(model, self.radius, self.eighth, self.half)
+        if self.height:
+            model.occ.translate([(3, volume)], 0.0, self.height, 0.0)
+            model.occ.synchronize()
         block = None if self.anvil is None else _add_anvil(model, self.anvil, self.half)
         field = model.mesh.field.add("MathEval")
         model.mesh.field.setString(field, "F", self._size_field())
@@ -97,7 +103,8 @@ class BallMesh:
             model.mesh.generate(3)
         _add_foot(model, sphere, self.foot, "foot")
         if top is not None:
-            _add_foot(model, top, WIDER * self.foot, "anvil_foot")
+            _add_foot(model, sphere, WIDER * self.foot, "cap")
+            _add_foot(model, top, self.foot, "anvil_foot")
 
     def _size_field(self) -> str:
         """Return min(coarsest, size + growth max(0, distance - foot)).
