@@ -326,19 +326,20 @@ class FrameWriter:
         )
         write_atomically(self._folder / FIELDS_INDEX, text.encode())
 
-    def _own_names(self, k: int) -> list[str]:
-        """Return which of the user's Functions the frame of a step has.
+    def _own_kinds(self, k: int) -> dict[str, Any]:
+        """Return which of the user's Functions the frame of a step has, and what they are.
 
         One of an earlier run, which this one goes on with, may have none.
         """
         if self._own is None:
-            return []
+            return {}
         if k not in self._has:
             path, group = self._places[k]
             with open_hdf5(path) as file:
                 self._has[k] = [name for name in self._own.names if name in file[group]]
         # what the user's function of the state returns is known from its first frame on
-        return [name for name in self._has[k] if name in self._own.kinds]
+        kinds = self._own.kinds
+        return {name: kinds[name] for name in self._has[k] if name in kinds}
 
     def _grid(self, k: int, t: float) -> str:
         nodes, cells, corners = self._shape
@@ -362,8 +363,7 @@ class FrameWriter:
         attributes.append(attribute("contact_status", "Node", nodes, number="Int", size=4))
         if self._von_mises is not None:
             attributes.append(attribute("von_mises", "Cell", cells))
-        for name in self._own_names(k):
-            about = self._own.kinds[name]
+        for name, about in self._own_kinds(k).items():
             shape = (cells if about.in_cells else nodes, *about.components)
             attributes.append(attribute(name, "Cell" if about.in_cells else "Node", *shape))
         return (

@@ -91,6 +91,7 @@ class OwnFunctions:
 
         # At the nodes it is what its own interpolation gives there; in cells it is as it is.
         space = self._space
+        blocks: Any
         if kind.in_cells:
             count = space.mesh.topology.index_map(space.mesh.topology.dim).size_local
             blocks = compat.cell_blocks(V)[:count, 0]

@@ -171,7 +171,7 @@ class Probe:
                 say(
                     "probe '%s' at %s takes the node that is %.3g m from it%s",
                     label,
-                    at(self.points[label]),
+                    at(np.asarray(self.points[label], dtype=float)),
                     distance,
                     why,
                 )

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....core.algebra import Array, Indices
+from ....core.algebra import Array, Indices, Mask
 
 CHUNK = 32  # CHOSEN: samples in which the end of a slide is looked for first; then twice as many
 
@@ -99,7 +99,7 @@ class _Way:
 
     side: float
     net: Array
-    slides: Array
+    slides: Mask
     times: Array
     speed: Array
     way: Array

@@ -35,6 +35,7 @@ FOOT = 1.3  # contact side over the largest contact radius of Hertz's impact at 
 GROWTH = 1.2  # of the cells, over their number in that radius, with the distance from the foot
 HEIGHT = 1.0e-8  # between ball and glass at the start [m]: what the facets of the ball leave out
 LENGTH = 1.05  # of a run, over the time of Hertz's impact at its normal speed
+LONGER = 1.5  # the same at the angles at which waves have to leave the glass
 # angles [deg] at which more than a measured quantity is told or judged
 RESTITUTION = (4.22, 20.22, 39.54, 71.07)
 MOMENT = (20.22, 39.54)
@@ -185,7 +186,7 @@ def throw(
         "problem": problem,
         "state": state,
         "dt": impact.duration / fine.steps,
-        "t_end": LENGTH * duration + HEIGHT / down,
+        "t_end": (LONGER if angle in WAVES else LENGTH) * duration + HEIGHT / down,
         "record": [vc.Energy(), vc.Contact(arrays=False), vc.BodyMotion("ball", ball)],
     }
 
