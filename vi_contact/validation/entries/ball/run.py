@@ -54,7 +54,7 @@ class Fineness:
         steps: in the time of the impact at 0 deg.
     """
 
-    cells: int
+    cells: float
     depth: float
     steps: int
 
@@ -64,6 +64,24 @@ FINENESS = {
     "coarse": Fineness(cells=4, depth=0.012, steps=100),
     "fine": Fineness(cells=8, depth=0.018, steps=200),
 }
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """Hold ball and glass at rest.
+
+    Attributes:
+        problem: both just before they touch.
+        ball: the cells of the ball.
+        along: velocities in the unknowns of the equations, of a ball that moves along the glass
+            with one metre a second.
+        up: the same away from the glass.
+    """
+
+    problem: vc.ContactProblem
+    ball: fem.Cells
+    along: np.ndarray
+    up: np.ndarray
 
 
 def figures(inputs: Inputs, fineness: str) -> Found:
@@ -76,8 +94,8 @@ def figures(inputs: Inputs, fineness: str) -> Found:
     found = Found()
     fine = FINENESS[fineness]
     impact = hertz(inputs)
-    problem, ball = set_up(inputs, impact, fine)
-    runs = [throw(inputs, problem, ball, impact, fine, row["angle"]) for row in inputs.rows]
+    bodies = set_up(inputs, impact, fine)
+    runs = [throw(inputs, bodies, impact, fine, row["angle"]) for row in inputs.rows]
     for number, solution in vc.simulate_many(runs):
         if not isinstance(solution, vc.Solution):
             raise solution
@@ -98,10 +116,8 @@ def hertz(inputs: Inputs) -> HertzImpact:
     )
 
 
-def set_up(
-    inputs: Inputs, impact: HertzImpact, fine: Fineness
-) -> tuple[vc.ContactProblem, fem.Cells]:
-    """Return half of the ball just above the glass, at rest, and the cells of the ball.
+def set_up(inputs: Inputs, impact: HertzImpact, fine: Fineness) -> Bodies:
+    """Return half of the ball just above the glass.
 
     Args:
         inputs: of the entry.
@@ -149,45 +165,41 @@ def set_up(
         surface = fem.contact_surface(system, tags["foot"], obstacle=plane)
     mu = inputs["mu_factor"] * inputs["mu"]
     friction = vc.Coulomb(mu) if mu > 0.0 else vc.Frictionless()
-    return vc.ContactProblem(system, surface, friction=friction), tags["ball"]
+    problem = vc.ContactProblem(system, surface, friction=friction)
+
+    # Impacts differ in their first velocities alone, so that all of them share their matrices.
+    own = np.isin(system.space.bodies, fem.bodies_of(system, tags["ball"]))
+    along, up = (
+        replace(problem, system=replace(system, v0=np.where(own, unit, 0.0))).equations.v0
+        for unit in system.influence.T[:2]
+    )
+    return Bodies(problem, tags["ball"], along, up)
 
 
 def throw(
-    inputs: Inputs,
-    problem: vc.ContactProblem,
-    ball: fem.Cells,
-    impact: HertzImpact,
-    fine: Fineness,
-    angle: float,
+    inputs: Inputs, bodies: Bodies, impact: HertzImpact, fine: Fineness, angle: float
 ) -> Mapping[str, Any]:
     """Return the arguments of the run of one impact.
 
     Args:
         inputs: of the entry.
-        problem: the ball at rest.
-        ball: its cells.
+        bodies: ball and glass at rest.
         impact: that at 0 deg, which all time steps are a part of.
         fine: how many steps it has.
         angle: between the velocity and the normal [deg].
     """
-    system = problem.system
     theta = math.radians(angle)
-    along = inputs["speed"] * math.sin(theta)
     down = inputs["speed"] * math.cos(theta)
-
-    # The velocity of the ball in the unknowns of the equations, all of which share their matrices.
-    own = np.isin(system.space.bodies, fem.bodies_of(system, ball))
-    towards = along * system.influence[:, 0] - down * system.influence[:, 1]
-    moving = replace(problem, system=replace(system, v0=np.where(own, towards, 0.0)))
-    rest = np.zeros(problem.surface.count)
-    state = vc.State(0.0, 0, np.zeros(system.rows), moving.equations.v0, rest, rest > 0.0)
+    v = inputs["speed"] * math.sin(theta) * bodies.along - down * bodies.up
+    rest = np.zeros(bodies.problem.surface.count)
+    state = vc.State(0.0, 0, np.zeros(len(v)), v, rest, rest > 0.0)
     duration = replace(impact, speed=down).duration
     return {
-        "problem": problem,
+        "problem": bodies.problem,
         "state": state,
         "dt": impact.duration / fine.steps,
         "t_end": (LONGER if angle in WAVES else LENGTH) * duration + HEIGHT / down,
-        "record": [vc.Energy(), vc.Contact(arrays=False), vc.BodyMotion("ball", ball)],
+        "record": [vc.Energy(), vc.Contact(arrays=False), vc.BodyMotion("ball", bodies.ball)],
     }
 
 
