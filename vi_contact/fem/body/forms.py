@@ -61,6 +61,7 @@ class ElasticForms:
     tells_stress = True
     symmetric = True
     own_damping = False
+    statics_only = False
     notes: tuple[str, ...] = ()
 
     def __init__(
