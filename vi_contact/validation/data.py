@@ -12,12 +12,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 from ..core.checks import shown
 from ..core.errors import InputError
 from ..core.own_files import read_bytes
 
-Row = Mapping[str, float | str | None]  # column -> value; None where the source has none
+Row = Mapping[str, Any]  # column -> number or word; None where the source has none
 
 NEEDED = ("source", "version", "licence", "how", "uncertainty")
 WORDS = "name"  # the unit of a column of words
@@ -107,7 +108,7 @@ def _read_row(path: Path, number: int, cells: Sequence[str], units: Mapping[str,
             f"'{path}': row {number} has {len(cells)} values for {len(units)} columns: give one "
             "for each"
         )
-    row: dict[str, float | str | None] = {}
+    row: dict[str, Any] = {}
     for (name, unit), cell in zip(units.items(), cells, strict=True):
         text = cell.strip()
         if not text:
