@@ -165,7 +165,8 @@ def judge(entry: Entry, setting: str, found: Found, seconds: float) -> Outcome:
     # what was found and nobody asked for, and the other way round
     why = []
     told = {one.name: found.figures.get(one.name, math.nan) for one in entry.told}
-    unasked = set(found.figures) - {one.name for one in wanted} - set(told)
+    known = {one.name for setting in SETTINGS for one in entry.wanted(setting)}
+    unasked = set(found.figures) - known - set(told)
     if unasked:
         why.append(f"{entry.name}: run.py found '{min(unasked)}', which entry.toml does not judge")
     for one in judgements:

@@ -46,6 +46,8 @@ def figures(inputs: Inputs, fineness: str) -> Found:
     record = vc.ground_motion.scaled_to_pga(record, inputs["peak"] * inputs["gravity"])
     end = min(record.duration, END[fineness])
     record = vc.ground_motion.trimmed(record, 0.0, end)
+    if DT[fineness] > record.dt:
+        record = vc.ground_motion.resampled(record, DT[fineness])
     models = {"finite elements": build_column, "base slip and one mode": build_mode}
     for row in inputs.rows:
         side = inputs["normal_sense"] * {"normal": 1.0, "inverse": -1.0}[row["sense"]]
