@@ -23,9 +23,9 @@ UNITS = {
     "side": "m",
 }
 # sizes of cells over the half length of the crack: at its tips, in its middle
-SIZES = {"smallest": (0.01, 0.07), "coarse": (0.002, 0.03), "fine": (0.001, 0.012)}
+SIZES = {"smallest": (0.01, 0.07), "coarse": (0.002, 0.03), "fine": (0.002, 0.012)}
 # of the sizes of cells, over the distance from the tips and from the crack
-GROWTH = {"smallest": 0.2, "coarse": 0.15, "fine": 0.07}
+GROWTH = {"smallest": 0.2, "coarse": 0.15, "fine": 0.1}
 INNER = 0.9  # of the half length: where tractions and slips are judged
 MEGA, MILLI = 1e6, 1e-3
 
