@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from ..practice.plots.histories import canvas, plain_numbers, save
+from ..practice.plots.histories import canvas, save
 
-__all__ = ["canvas", "draw_over_wanted", "plain_numbers", "save"]
+__all__ = ["canvas", "draw_over_wanted", "save"]
 
 
 def draw_over_wanted(
@@ -34,5 +34,6 @@ def draw_over_wanted(
     axis.plot(x, y, "o", ms=3.5, fillstyle="none", color="tab:blue")
     axis.set_xscale("log")
     axis.set_yscale("log")
-    plain_numbers(axis.xaxis)
-    plain_numbers(axis.yaxis)
+    axis.set_aspect("equal")
+    for side in (axis.xaxis, axis.yaxis):
+        side.set_major_formatter("{x:g}")
