@@ -28,7 +28,7 @@ def _records(monkeypatch: pytest.MonkeyPatch) -> None:
 def need_records(name: str) -> None:
     """Skip where the records of an entry are not there; the sentence says how to get them."""
     try:
-        read_entry(name).given("smallest")
+        read_entry(name).gather_inputs("smallest")
     except Missing as error:
         pytest.skip(str(error))
 

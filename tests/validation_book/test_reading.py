@@ -27,7 +27,7 @@ def test_an_entry_passes(tmp_path: Path) -> None:
 
 
 def test_a_run_sees_no_value_that_it_is_compared_with(tmp_path: Path) -> None:
-    given = read_entry(small_entry(tmp_path / "line")).given("coarse")
+    given = read_entry(small_entry(tmp_path / "line")).gather_inputs("coarse")
     assert given.rows[0] == {"x": 1.0, "place": "here"}
 
 
@@ -224,7 +224,7 @@ def test_the_report_has_a_table_and_a_page(tmp_path: Path) -> None:
     good = run_entry(small_entry(tmp_path / "line"))
     bad = run_entry(small_entry(tmp_path / "bad", rows=""))
     paths = write_report(tmp_path / "out", [good, bad])
-    assert [path.name for path in paths] == ["validation.csv", "validation.pdf"]
+    assert [path.name for path in paths] == ["report.csv", "report.pdf"]
     lines = paths[0].read_text(encoding="utf-8").splitlines()
     assert len(lines) == 4 and lines[0].startswith("entry,setting,figure,unit,found,wanted")
     assert lines[3].startswith("bad,coarse,") and ",fail," in lines[3]

@@ -178,7 +178,7 @@ class Entry:
         chosen = self.row_filters.get(setting, {})
         return [row for row in self.data.rows if _matches(row, chosen)]
 
-    def wanted(self, setting: str) -> list[Wanted]:
+    def list_wanted(self, setting: str) -> list[Wanted]:
         """Return what the figures of a setting are compared with, in the order of entry.toml."""
         wanted: list[Wanted] = []
         for table in self.figure_tables:
@@ -186,7 +186,7 @@ class Entry:
                 wanted += _expand_figure(self, table, self.rows(setting))
         return wanted
 
-    def given(self, setting: str, change: Mapping[str, Any] | None = None) -> Inputs:
+    def gather_inputs(self, setting: str, change: Mapping[str, Any] | None = None) -> Inputs:
         """Return the inputs of a computation.
 
         Args:
@@ -464,7 +464,7 @@ def _refuse_unfit(entry: Entry) -> None:
 
 def _names_of(entry: Entry, setting: str) -> set[str]:
     """Return the names of all figures and statistics of a setting, each of which occurs once."""
-    wanted = entry.wanted(setting)
+    wanted = entry.list_wanted(setting)
     if not wanted:
         raise InputError(f"nothing is judged at the setting '{setting}': add a [[figure]]")
     names = [one.name for one in wanted] + [one.name for one in entry.statistics]

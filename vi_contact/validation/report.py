@@ -15,7 +15,7 @@ HEADER = ("figure", "unit", "found", "wanted", "error", "limit", "verdict")
 
 
 def write_report(folder: str | Path, outcomes: Sequence[Outcome]) -> list[Path]:
-    """Write validation.csv, validation.pdf and a picture of each entry; return their paths.
+    """Write report.csv, report.pdf and a picture of each entry; return their paths.
 
     Args:
         folder: where they go; it is made if it does not exist.
@@ -23,7 +23,7 @@ def write_report(folder: str | Path, outcomes: Sequence[Outcome]) -> list[Path]:
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    table = folder / "validation.csv"
+    table = folder / "report.csv"
     write_results(table, outcomes)
     pictures = {}
     for outcome in outcomes:
@@ -34,7 +34,7 @@ def write_report(folder: str | Path, outcomes: Sequence[Outcome]) -> list[Path]:
     for outcome in outcomes:
         own = [pictures[outcome.name]] if outcome.name in pictures else []
         sections.append(_section_of(outcome, own))
-    page = folder / "validation.pdf"
+    page = folder / "report.pdf"
     write_pages(
         page,
         "Validation of vi_contact",
@@ -157,8 +157,8 @@ def describe(outcome: Outcome) -> str:
     if outcome.status == SKIP:
         return f"{outcome.name}: skip: {' '.join(outcome.why)}"
     lines = [f"{outcome.name}: {outcome.status}, {outcome.seconds:.1f} s"]
-    if outcome.found is not None:
-        found = outcome.found
+    found = outcome.found
+    if found is not None and found.unknowns:
         lines[0] += f", {found.unknowns} unknowns, certificate {found.certificate:.1e}"
         if found.defect == found.defect:  # not NaN: there was a run in time
             lines[0] += f", energy defect {found.defect:.1e}"
@@ -182,6 +182,5 @@ def describe(outcome: Outcome) -> str:
             f"{agreed.where}"
         )
     lines += [f"  told  {name}: {value:.6g}" for name, value in outcome.told.items()]
-    judged = {one.name for one in outcome.judgements}
-    lines += [f"  {why}" for why in outcome.why if not any(f"'{name}'" in why for name in judged)]
+    lines += [f"  {why}" for why in outcome.why]
     return "\n".join(lines)

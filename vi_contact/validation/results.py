@@ -1,6 +1,6 @@
 """Keep what entries found as rows of a csv file, and tell what has moved since.
 
-The files of ``results`` are those of the last run of the whole book at each setting. They are what
+The files of ``stored`` are those of the last run of the whole book at each setting. They are what
 was found before; a limit says what is right.
 """
 
@@ -15,7 +15,7 @@ from ..core.files import write_output
 from ..core.own_files import read_bytes
 from .runner import Outcome
 
-RESULTS = Path(__file__).resolve().parent / "results"
+RESULTS = Path(__file__).resolve().parent / "stored"
 COLUMNS = (
     "entry",
     "setting",
@@ -87,11 +87,16 @@ def rows_of(outcome: Outcome) -> list[dict[str, Any]]:
 
 def write_results(path: str | Path, outcomes: Iterable[Outcome]) -> None:
     """Write the rows of outcomes as a csv file."""
+    write_rows(path, [row for outcome in outcomes for row in rows_of(outcome)])
+
+
+def write_rows(path: str | Path, rows: Iterable[Row]) -> None:
+    """Write rows of results as a csv file; NaN is an empty cell."""
     text = io.StringIO()
     writer = csv.DictWriter(text, COLUMNS, restval="", lineterminator="\n")
     writer.writeheader()
-    for outcome in outcomes:
-        writer.writerows(rows_of(outcome))
+    for row in rows:
+        writer.writerow({key: "" if value != value else value for key, value in row.items()})
     write_output(path, text.getvalue().encode())
 
 
@@ -127,6 +132,6 @@ def find_moved(outcome: Outcome, stored: Sequence[Row]) -> list[str]:
     return sentences
 
 
-def expected_seconds(name: str, stored: Sequence[Row]) -> float:
+def estimate_seconds(name: str, stored: Sequence[Row]) -> float:
     """Return how long an entry took in the last run of the book."""
     return max((row["seconds"] for row in stored if row["entry"] == name), default=PATIENCE)

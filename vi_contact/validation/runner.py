@@ -21,7 +21,9 @@ from .entry import RUN, SETTINGS, Entry, Missing, Mutant, Wanted, read_entry, re
 from .found import Found
 from .statistics import QUANTITIES, Agreement, agreement
 
-PASS, FAIL, SKIP = "pass", "fail", "skip"
+PASS = "pass"
+FAIL = "fail"
+SKIP = "skip"
 
 
 @dataclass(frozen=True)
@@ -114,7 +116,7 @@ def run_entry(
     try:
         entry = read_entry(name)
         refuse_units(entry)
-        inputs = entry.given(setting, change)
+        inputs = entry.gather_inputs(setting, change)
     except Missing as error:
         return Outcome(short, setting, SKIP, [str(error)])
     except InputError as error:
@@ -148,7 +150,7 @@ def judge(entry: Entry, setting: str, found: Found, seconds: float) -> Outcome:
         found: what run.py returned.
         seconds: that it took.
     """
-    wanted = entry.wanted(setting)
+    wanted = entry.list_wanted(setting)
     judgements = [_judge_figure(one, found) for one in wanted]
     agreements = _compare_series(wanted, found)
     for statistic in entry.statistics:
@@ -165,7 +167,7 @@ def judge(entry: Entry, setting: str, found: Found, seconds: float) -> Outcome:
     # what was found and nobody asked for, and the other way round
     why = []
     told = {one.name: found.figures.get(one.name, math.nan) for one in entry.told}
-    known = {one.name for setting in SETTINGS for one in entry.wanted(setting)}
+    known = {one.name for setting in SETTINGS for one in entry.list_wanted(setting)}
     unasked = set(found.figures) - known - set(told)
     if unasked:
         why.append(f"{entry.name}: run.py found '{min(unasked)}', which entry.toml does not judge")
@@ -247,5 +249,7 @@ def judge_mutant(
     if RUN in mutant.red:
         return isinstance(outcome.error, ViContactError), outcome
     names = [one.name for one in outcome.judgements if not one.counted]
-    red = {one for one in names if any(fnmatchcase(one, pattern) for pattern in mutant.red)}
+    red: set[str] = set()
+    for pattern in mutant.red:
+        red |= {one for one in names if fnmatchcase(one, pattern)}
     return bool(red) and red <= set(outcome.failed), outcome

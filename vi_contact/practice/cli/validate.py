@@ -46,7 +46,7 @@ def add_validate_command(commands: Any) -> None:
         "--json", action="store_true", help="print one JSON list with all figures, and no text"
     )
     validate.add_argument(
-        "--out", metavar="DIR", help="write validation.csv, validation.pdf and pictures there"
+        "--out", metavar="DIR", help="write report.csv, report.pdf and pictures there"
     )
     validate.add_argument("--quiet", action="store_true", help="print no progress")
 
@@ -56,7 +56,7 @@ def _validate(options: argparse.Namespace) -> str:
 
     from ...validation.entry import entry_names, find_entry, read_entry  # late
     from ...validation.report import write_report
-    from ...validation.results import expected_seconds, read_results
+    from ...validation.results import estimate_seconds, read_results
 
     names = options.names or entry_names()
     for name in names:
@@ -68,7 +68,7 @@ def _validate(options: argparse.Namespace) -> str:
     if options.fine or options.smallest:
         setting = "fine" if options.fine else "smallest"
     stored = read_results(setting)
-    progress = _Progress({name: expected_seconds(name, stored) for name in names}, options.quiet)
+    progress = _Progress({name: estimate_seconds(name, stored) for name in names}, options.quiet)
     outcomes = []
     mutants: dict[str, dict[str, bool]] = {}
     for name in names:
@@ -158,6 +158,9 @@ def _as_object(outcome: "Outcome") -> dict[str, Any]:
     for row in rows:
         figures.append({key: plain(value) for key, value in row.items() if key not in shared})
     found = outcome.found
+    series = {}
+    for name, one in outcome.agreements.items():
+        series[name] = {key: plain(value) for key, value in vars(one).items()}
     return {
         "entry": outcome.name,
         "setting": outcome.setting,
@@ -167,10 +170,7 @@ def _as_object(outcome: "Outcome") -> dict[str, Any]:
         "unknowns": None if found is None else found.unknowns,
         "certificate": None if found is None else plain(found.certificate),
         "energy_defect": None if found is None else plain(found.defect),
-        "series": {
-            name: {key: plain(value) for key, value in vars(one).items()}
-            for name, one in outcome.agreements.items()
-        },
+        "series": series,
         "figures": figures,
     }
 

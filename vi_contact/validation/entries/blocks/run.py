@@ -61,7 +61,13 @@ def figures(inputs: Inputs, fineness: str) -> Found:
 
 
 def draw(found: Found, data: Data, path: Path) -> None:
-    """Draw the slips over those of SLAMMER, with the band of a single value."""
+    """Draw the slips over those of SLAMMER, with the band of a single value.
+
+    Args:
+        found: what ``figures`` returned.
+        data: the numbers of the source.
+        path: of the picture.
+    """
     from vi_contact.validation.pictures import canvas, draw_over_wanted, save
 
     wanted = []

@@ -119,7 +119,13 @@ def slide(
 
 
 def draw(found: Found, data: Data, path: Path) -> None:
-    """Draw the history of the first slip below the motion of the ground."""
+    """Draw the history of the first slip below the motion of the ground.
+
+    Args:
+        found: what ``figures`` returned.
+        data: the numbers of the source.
+        path: of the picture.
+    """
     from vi_contact.validation.pictures import canvas, save
 
     figure, axes = canvas(2, 1, (6.5, 4.5), sharex=True)

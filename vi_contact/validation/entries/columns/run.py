@@ -166,7 +166,13 @@ def slide(
 
 
 def draw(found: Found, data: Data, path: Path) -> None:
-    """Draw the slip histories of every column, and the end value of SLAMMER."""
+    """Draw the slip histories of every column, and the end value of SLAMMER.
+
+    Args:
+        found: what ``figures`` returned.
+        data: the numbers of the source.
+        path: of the picture.
+    """
     from vi_contact.validation.pictures import canvas, save
 
     heights = sorted({row["H"] for row in data.rows})

@@ -27,7 +27,8 @@ SIZES = {"smallest": (0.01, 0.07), "coarse": (0.002, 0.03), "fine": (0.002, 0.01
 # of the sizes of cells, over the distance from the tips and from the crack
 GROWTH = {"smallest": 0.2, "coarse": 0.15, "fine": 0.1}
 INNER = 0.9  # of the half length: where tractions and slips are judged
-MEGA, MILLI = 1e6, 1e-3
+MEGA = 1e6
+MILLI = 1e-3
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,13 @@ class CrackedSquare:
             gmsh.option.setNumber(name, value)
 
     def grade(self, gmsh: Any, crack: list[int], ends: list[int]) -> None:
-        """Let the sizes of cells grow with the distance from the crack and from its tips."""
+        """Let the sizes of cells grow with the distance from the crack and from its tips.
+
+        Args:
+            gmsh: its module.
+            crack: tags of the curves of the crack.
+            ends: tags of its ends.
+        """
         fields = gmsh.model.mesh.field
         places = {"CurvesList": crack, "PointsList": ends}
         terms = []
@@ -151,7 +158,13 @@ def figures(inputs: Inputs, fineness: str) -> Found:
 
 
 def draw(found: Found, data: Data, path: Path) -> None:
-    """Draw tractions and slip along the crack, with the closed form."""
+    """Draw tractions and slip along the crack, with the closed form.
+
+    Args:
+        found: what ``figures`` returned.
+        data: the numbers of the source.
+        path: of the picture.
+    """
     from vi_contact.validation.pictures import canvas, save
 
     along, normal, shear, slip, ellipse = found.curves["crack"]

@@ -186,7 +186,13 @@ def add_dam(found: Found, inputs: Inputs, dam: Dam, name: str, fineness: str) ->
 
 
 def draw(found: Found, data: Data, path: Path) -> None:
-    """Draw the contact pressure along the base of each dam beside the linear formula."""
+    """Draw the contact pressure along the base of each dam beside the linear formula.
+
+    Args:
+        found: what ``figures`` returned.
+        data: the numbers of the source.
+        path: of the picture.
+    """
     from vi_contact.validation.pictures import canvas, save
 
     figure, axes = canvas(1, len(found.curves), (5.0 * len(found.curves), 3.2))

@@ -136,14 +136,26 @@ def grow(cell: float, even: float, growth: float, end: float) -> np.ndarray:
 
 
 def place_nodes(points: np.ndarray, across: np.ndarray, up: np.ndarray) -> np.ndarray:
-    """Return the nodes of an even lattice on the unit square, moved to given columns and rows."""
+    """Return the nodes of an even lattice on the unit square, moved to given columns and rows.
+
+    Args:
+        points: (n, 2) of the lattice.
+        across: (k,) places of its columns [m].
+        up: (l,) places of its rows [m].
+    """
     columns = np.rint(points[:, 0] * (len(across) - 1)).astype(int)
     rows = np.rint(points[:, 1] * (len(up) - 1)).astype(int)
     return np.column_stack([across[columns], up[rows]])
 
 
 def draw(found: Found, data: Data, path: Path) -> None:
-    """Draw the shear of the stuck fault and the slip without friction, with the closed forms."""
+    """Draw the shear of the stuck fault and the slip without friction, with the closed forms.
+
+    Args:
+        found: what ``figures`` returned.
+        data: the numbers of the source.
+        path: of the picture.
+    """
     from vi_contact.validation.pictures import canvas, save
 
     y, shear, slip = found.curves["fault"]

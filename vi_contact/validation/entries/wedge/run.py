@@ -100,7 +100,13 @@ def push(found: Found, inputs: Inputs, mu: float, cells: tuple[int, ...]) -> tup
 
 
 def draw(found: Found, data: Data, path: Path) -> None:
-    """Draw F/G over mu: the closed form, and what was found in the plane and in space."""
+    """Draw F/G over mu: the closed form, and what was found in the plane and in space.
+
+    Args:
+        found: what ``figures`` returned.
+        data: the numbers of the source.
+        path: of the picture.
+    """
     from vi_contact.validation.pictures import canvas, save
 
     figure, axes = canvas(1, 1, (5.0, 3.2))
