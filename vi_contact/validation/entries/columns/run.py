@@ -30,7 +30,7 @@ DENSITY = 2000.0  # kg/m³; slips do not depend on it
 NU = 0.3  # of the column; nor on it: nothing moves along its axis but its weight
 CELLS = {"smallest": 8, "coarse": 16, "fine": 32}  # along the column
 DT = {"smallest": 0.02, "coarse": 0.01, "fine": 0.005}  # s; that of the record is 0.01
-END = {"smallest": 10.5, "coarse": 20.0, "fine": math.inf}  # s; after it no base slides
+END = {"smallest": 10.5, "coarse": 20.0, "fine": math.inf}  # s; what is later adds 0.1 % at most
 
 
 def figures(inputs: Inputs, fineness: str) -> Found:
