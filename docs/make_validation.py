@@ -16,14 +16,12 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from vi_contact.validation import Entry, agreement, entry_names, read_entry, run_entry
+from vi_contact.validation import Entry, entry_names, read_entry, run_entry
 from vi_contact.validation.data import NEEDED
 from vi_contact.validation.entry import KINDS, RECORDS, SETTINGS
 from vi_contact.validation.report import draw_outcome, input_rows
 from vi_contact.validation.results import RESULTS, read_results, rows_of, write_rows
-from vi_contact.validation.runner import FAIL
+from vi_contact.validation.runner import FAIL, compare_groups
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "reference" / "validation.md"
@@ -114,7 +112,7 @@ def section(entry: Entry, stored: dict[str, Rows]) -> Iterator[str]:
     yield from cost(own)
     yield from judged_figures(own)
     yield from reasons(own)
-    yield from series(own)
+    yield from series(entry, own)
     yield from table(("input", "value", "unit", "kind", "source"), input_rows(entry))
     names = ", ".join(mutant.name for mutant in entry.mutants)
     yield f"Wrong inputs that must be noticed, and are, in `tests/validation_book`: {names}.\n"
@@ -171,25 +169,22 @@ def reasons(own: dict[str, Rows]) -> Iterator[str]:
     yield from table(("figure", "why this limit"), rows)
 
 
-def series(own: dict[str, Rows]) -> Iterator[str]:
-    """Yield a sentence about a series of values, of each setting that has one."""
+def series(entry: Entry, own: dict[str, Rows]) -> Iterator[str]:
+    """Yield a sentence about each series, and each other group of many values."""
     for setting in ("coarse", "fine"):
-        members = [row for row in own[setting] if row["verdict"] in ("within", "outside")]
-        if not members:
-            continue
-        found, wanted, limits = (
-            np.array([row[key] for row in members]) for key in ("found", "wanted", "limit")
-        )
-        one = agreement([row["figure"] for row in members], found, wanted, limits)
-        outside = [row["figure"] for row in members if row["verdict"] == "outside"]
-        unit = members[0]["unit"]
-        yield (
-            f"At the setting {setting} {one.count} values have the slope {one.slope:.5f}, the "
-            f"intercept {one.intercept:.3f} {unit} and R² = {one.r2:.6f}. Of them "
-            f"{100 * one.share:.1f} % are within their limits; the median of the relative error is "
-            f"{100 * one.median:.2f} %. The largest difference is {one.largest:.3f} {unit}, at "
-            f"{one.where}.\n"
-        )
+        rows = {row["figure"]: row for row in own[setting]}
+        figures = {name: row["found"] for name, row in rows.items()}
+        wanted = entry.list_wanted(setting) if rows else []
+        for group, one in compare_groups(wanted, figures).items():
+            unit = next(each.unit for each in wanted if each.group == group)
+            yield (
+                f"At the setting {setting} {one.count} values of *{group}* have the slope "
+                f"{one.slope:.5f}, the intercept {one.intercept:.3g} {unit} and R² = {one.r2:.6f}. "
+                f"Of them {100 * one.share:.1f} % are within their limits; the median of the "
+                f"relative error is {100 * one.median:.2f} %. The largest difference is "
+                f"{one.largest:.3g} {unit}, at {one.where}.\n"
+            )
+        outside = [name for name, row in rows.items() if row["verdict"] == "outside"]
         if outside:
             yield "Outside of their limits are:\n"
             yield from (f"- {name}" for name in outside)

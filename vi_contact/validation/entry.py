@@ -97,6 +97,8 @@ class Wanted:
         limit: largest |found - value|.
         reason: why the limit is what it is, one sentence.
         series: the series that it counts in; "" for a figure that is judged by itself.
+        group: the series, or the name with its {columns} of the table that it is one of; "" for
+            a figure that stands alone.
     """
 
     name: str
@@ -105,6 +107,7 @@ class Wanted:
     limit: float
     reason: str
     series: str = ""
+    group: str = ""
 
 
 @dataclass(frozen=True)
@@ -398,7 +401,15 @@ def _expand_figure(entry: Entry, table: Mapping[str, Any], rows: Sequence[Row]) 
         cell = row[column]
         if isinstance(cell, float) and _matches(row, table.get("where", {})):
             limit = _limit(table, cell, owner)
-            yield Wanted(fill_in(name, row), unit, cell, limit, reason, table.get("series", ""))
+            yield Wanted(
+                fill_in(name, row),
+                unit,
+                cell,
+                limit,
+                reason,
+                series=table.get("series", ""),
+                group=table.get("series", name),
+            )
 
 
 def fill_in(name: str, row: Row) -> str:

@@ -24,6 +24,7 @@ from .statistics import QUANTITIES, Agreement, agreement
 PASS = "pass"
 FAIL = "fail"
 SKIP = "skip"
+MANY = 5  # more values of one kind than these are told as a line of found over wanted too
 
 
 @dataclass(frozen=True)
@@ -152,7 +153,7 @@ def judge(entry: Entry, setting: str, found: Found, seconds: float) -> Outcome:
     """
     wanted = entry.list_wanted(setting)
     judgements = [_judge_figure(one, found) for one in wanted]
-    agreements = _compare_series(wanted, found)
+    agreements = compare_groups(wanted, found.figures)
     for statistic in entry.statistics:
         value = float(getattr(agreements[statistic.series], statistic.what))
         unit = "-"
@@ -205,15 +206,22 @@ def _judge_figure(wanted: Wanted, found: Found) -> Judgement:
     )
 
 
-def _compare_series(wanted: Sequence[Wanted], found: Found) -> dict[str, Agreement]:
-    """Return series -> how well its values agree."""
+def compare_groups(wanted: Sequence[Wanted], figures: Mapping[str, float]) -> dict[str, Agreement]:
+    """Return how well series agree, and other groups of more than ``MANY`` values.
+
+    Args:
+        wanted: what the figures are compared with.
+        figures: name -> what was found.
+    """
     agreements = {}
-    for series in dict.fromkeys(one.series for one in wanted if one.series):
-        members = [one for one in wanted if one.series == series]
+    for group in dict.fromkeys(one.group for one in wanted if one.group):
+        members = [one for one in wanted if one.group == group]
+        if not members[0].series and len(members) <= MANY:
+            continue
         names = [one.name for one in members]
-        agreements[series] = agreement(
+        agreements[group] = agreement(
             names,
-            np.array([float(found.figures.get(name, math.nan)) for name in names]),
+            np.array([float(figures.get(name, math.nan)) for name in names]),
             np.array([one.value for one in members]),
             np.array([one.limit for one in members]),
         )

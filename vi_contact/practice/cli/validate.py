@@ -40,7 +40,10 @@ def add_validate_command(commands: Any) -> None:
     validate.add_argument(
         "--mutants",
         action="store_true",
-        help="compute every entry with each of its wrong inputs too, which must be noticed",
+        help=(
+            "compute every entry with each of its wrong inputs too, at the smallest setting: they "
+            "must be noticed"
+        ),
     )
     validate.add_argument(
         "--json", action="store_true", help="print one JSON list with all figures, and no text"
@@ -117,7 +120,7 @@ def _judge_mutants(options: argparse.Namespace, name: str, outcome: "Outcome") -
     mutants = () if outcome.entry is None else outcome.entry.mutants
     verdicts = {}
     for mutant in mutants:
-        verdicts[mutant.name], changed = judge_mutant(name, mutant, setting=outcome.setting)
+        verdicts[mutant.name], changed = judge_mutant(name, mutant)
         words = "noticed" if verdicts[mutant.name] else "NOT NOTICED"
         fails = ", ".join(changed.failed) or " ".join(changed.why)
         _print(options, f"  mutant {words}: {mutant.name}: {fails}")
