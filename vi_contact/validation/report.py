@@ -155,7 +155,7 @@ def input_rows(entry: Entry) -> Sequence[tuple[str, ...]]:
 def describe(outcome: Outcome) -> str:
     """Return an outcome in lines for a terminal."""
     if outcome.status == SKIP:
-        return f"{outcome.name}: skip: {' '.join(outcome.why)}"
+        return f"{outcome.name}: skip, {' '.join(outcome.why).removeprefix(f'{outcome.name}: ')}"
     lines = [f"{outcome.name}: {outcome.status}, {outcome.seconds:.1f} s"]
     found = outcome.found
     if found is not None and found.unknowns:
