@@ -48,15 +48,36 @@ to repeat it:
 The command ends with a status other than 0 when a figure is missing, NaN or outside of its limit,
 when data were changed, and when a run ends in an error. Some entries need records that are not
 part of the package. They are skipped, and this is printed, unless the environment variable
-`{RECORDS}` names the folder of the records.
+`{RECORDS}` names the folder of the records. Those of SLAMMER are in the public domain, and in
+the folder `src/pyslammer/sample_ground_motions` of
+[pySLAMMER](https://github.com/pySLAMMER/pySLAMMER) (commit dd8cfad3); `entry.toml` has the
+checksum of each.
 
 A changed value of `data.csv` is noticed in two ways. The file has a checksum in `entry.toml`, so
 that any change fails. A value that is changed by two limits also fails by its figure. In a series
 of many values, which is judged by statistics, a single value is noticed by the checksum alone.
 
+There are two numbers for each figure: the limit says what is right, and the stored results in
+`vi_contact/validation/stored` say what was found before. The command tells a figure that has
+moved by more than a tenth of its limit since then, and a test fails.
+
 A figure is *told* when it is of interest and nothing says what is right. The certificate is the
 worst of all steps and static stages, and the energy defect that of all runs in time
 ([glossary](glossary.md)). Seconds are those of one core of a small machine.
+"""
+
+FOOT = """## Not in the book yet
+
+- **Graphite bricks** (81 of them on a shaking table, measured): many bodies with gaps between
+  them, each with clearances that are part of the data.
+- **Stick-slip of a fault of 4 m** (FB03-087, measured): it needs friction that weakens with slip,
+  and mu may not depend on slip here.
+- **SSNP142 of code_aster** (a joint of a dam): its joint is a penalty, and its geometry is not
+  at hand.
+- **Example 8.8 of Kramer and Stewart**, and the periods of Pine Flat dam with its reservoir: the
+  second needs the added mass of water.
+- **Statistics of rocking blocks, and pounding of buildings**: their tables are not public, and
+  have to be fetched by hand.
 """
 
 
@@ -198,7 +219,7 @@ def written(names: Sequence[str]) -> str:
     lines = [HEAD, *overview(entries, stored)]
     for entry in entries:
         lines += section(entry, stored)
-    return "\n".join(lines).rstrip() + "\n"
+    return "\n".join([*lines, FOOT])
 
 
 def run_all(names: Sequence[str]) -> int:
