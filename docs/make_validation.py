@@ -59,7 +59,7 @@ of many values, which is judged by statistics, a single value is noticed by the 
 
 There are two numbers for each figure: the limit says what is right, and the stored results in
 `vi_contact/validation/stored` say what was found before. The command tells a figure that has
-moved by more than a tenth of its limit since then, and a test fails.
+moved by more than a third of its limit since then, and a test fails.
 
 A figure is *told* when it is of interest and nothing says what is right. The certificate is the
 worst of all steps and static stages, and the energy defect that of all runs in time

@@ -192,10 +192,10 @@ def test_figures_that_have_moved_are_told(tmp_path: Path) -> None:
     outcome = run_entry(small_entry(tmp_path / "line"))
     stored = rows_of(outcome)
     assert find_moved(outcome, stored) == []
-    stored[0]["found"] = 10.04  # less than a tenth of the limit
+    stored[0]["found"] = 10.16  # less than a third of the limit
     assert find_moved(outcome, stored) == []
-    stored[0]["found"] = 10.06
-    assert find_moved(outcome, stored) == ["line: 'y at 1 m, here' has moved from 10.06 to 10"]
+    stored[0]["found"] = 10.17
+    assert find_moved(outcome, stored) == ["line: 'y at 1 m, here' has moved from 10.17 to 10"]
 
 
 def test_the_command_prints_and_ends_with_its_status(
