@@ -14,7 +14,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from ..core.checks import shown
+from ..core.checks import quote
 from ..core.errors import InputError
 from ..core.own_files import read_bytes
 
@@ -132,5 +132,5 @@ def _read_number(path: Path, number: int, name: str, text: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise InputError(f"'{path}': row {number} has {name} = {shown(text)}: give a finite number")
+        raise InputError(f"'{path}': row {number} has {name} = {quote(text)}: give a finite number")
     return value

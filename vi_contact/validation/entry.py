@@ -25,7 +25,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from ..core.checks import shown
+from ..core.checks import quote
 from ..core.errors import InputError
 from ..core.own_files import read_bytes
 from .data import Data, Row, read_data
@@ -230,7 +230,7 @@ def find_entry(name: str | Path) -> Path:
     folder = ENTRIES / name if str(name) in known else Path(name)
     if not (folder / "entry.toml").is_file():
         raise InputError(
-            f"no entry of the validation book is called {shown(str(name))}: choose one of "
+            f"no entry of the validation book is called {quote(str(name))}: choose one of "
             f"{', '.join(known)}, or give the folder of one"
         )
     return folder
@@ -261,7 +261,7 @@ def _read_folder(folder: Path) -> Entry:
         if key not in (*_WORDS, *_TABLES):
             raise InputError(f"entry.toml has '{key}', which nothing reads: leave it out")
     if tables.get("kind") not in KINDS:
-        raise InputError(f"kind is {shown(tables.get('kind'))}: give one of {', '.join(KINDS)}")
+        raise InputError(f"kind is {quote(tables.get('kind'))}: give one of {', '.join(KINDS)}")
     for key in ("title", "about"):
         _text(tables, key, "entry.toml")
     for key in ("model", "is_not"):
@@ -296,7 +296,7 @@ def _refuse_changed(data: Data, table: Mapping[str, Any]) -> None:
     if table.get("sha256") != data.checksum:
         raise InputError(
             f"data.csv was changed: its checksum is {data.checksum}, and entry.toml has "
-            f"{shown(table.get('sha256'))} in [data]: take the file of the book again, or, if the "
+            f"{quote(table.get('sha256'))} in [data]: take the file of the book again, or, if the "
             "source was corrected, say so in the file and enter the new checksum"
         )
 
@@ -321,7 +321,7 @@ def _number(table: Mapping[str, Any], key: str, owner: str) -> float:
     """Return a finite number of a table."""
     value = table.get(key)
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise InputError(f"{owner}: {key} is {shown(value)}: give a finite number")
+        raise InputError(f"{owner}: {key} is {quote(value)}: give a finite number")
     return float(value)
 
 
@@ -329,9 +329,9 @@ def _read_input(name: str, table: Any) -> Input:
     """Return an input of entry.toml."""
     owner = f"input '{name}'"
     if not isinstance(table, Mapping):
-        raise InputError(f"{owner} is {shown(table)}: give a table [inputs.{name}]")
+        raise InputError(f"{owner} is {quote(table)}: give a table [inputs.{name}]")
     if table.get("kind") not in ORIGINS:
-        raise InputError(f"{owner} has kind {shown(table.get('kind'))}: give {', '.join(ORIGINS)}")
+        raise InputError(f"{owner} has kind {quote(table.get('kind'))}: give {', '.join(ORIGINS)}")
     source = _text(table, "source", owner)
     value = table.get("value")
     if isinstance(value, bool | str):
@@ -341,7 +341,7 @@ def _read_input(name: str, table: Any) -> Input:
 
 def _read_statistic(table: Mapping[str, Any]) -> Statistic:
     """Return a limit of a series."""
-    owner = f"statistic {shown(table.get('name'))}"
+    owner = f"statistic {quote(table.get('name'))}"
     what = _text(table, "what", owner)
     if what not in QUANTITIES:
         raise InputError(f"{owner}: what is '{what}': give one of {', '.join(QUANTITIES)}")
@@ -357,14 +357,14 @@ def _read_statistic(table: Mapping[str, Any]) -> Statistic:
 
 def _read_told(table: Mapping[str, Any]) -> Told:
     """Return what is told and not judged."""
-    owner = f"told {shown(table.get('name'))}"
+    owner = f"told {quote(table.get('name'))}"
     name, unit, reason = (_text(table, key, owner) for key in ("name", "unit", "reason"))
     return Told(name, unit, reason)
 
 
 def _read_mutant(table: Mapping[str, Any]) -> Mutant:
     """Return a change that must be noticed."""
-    owner = f"mutant {shown(table.get('name'))}"
+    owner = f"mutant {quote(table.get('name'))}"
     name = _text(table, "name", owner)
     change = table.get("change")
     red = table.get("red")
@@ -375,7 +375,7 @@ def _read_mutant(table: Mapping[str, Any]) -> Mutant:
 
 def _expand_figure(entry: Entry, table: Mapping[str, Any], rows: Sequence[Row]) -> Iterator[Wanted]:
     """Yield what a table [[figure]] wants: one value, or one for each row that it names."""
-    owner = f"figure {shown(table.get('name'))}"
+    owner = f"figure {quote(table.get('name'))}"
     for key in table:
         if key not in _FIGURE:
             raise InputError(f"{owner} has '{key}', which nothing reads: leave it out")
@@ -391,7 +391,7 @@ def _expand_figure(entry: Entry, table: Mapping[str, Any], rows: Sequence[Row]) 
 
     column = table["column"]
     if column not in entry.data.units:
-        raise InputError(f"{owner}: data.csv has no column {shown(column)}: name one that it has")
+        raise InputError(f"{owner}: data.csv has no column {quote(column)}: name one that it has")
     if entry.data.units[column] != unit:
         raise InputError(
             f"{owner} has the unit '{unit}', and column '{column}' of data.csv "

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from ..core.version import __version__
 from ..practice.plots.pages import write_pages
-from ..practice.plots.sections import Section, Table, number
+from ..practice.plots.sections import Section, Table, format_number
 from .entry import KINDS, Entry
 from .results import write_results
 from .runner import SKIP, Outcome
@@ -67,8 +67,8 @@ def _sum_up(outcomes: Sequence[Outcome]) -> Section:
                 f"{within} of {len(judged)}",
                 f"{outcome.seconds:.1f}",
                 "-" if found is None else str(found.unknowns),
-                "-" if found is None else number(found.certificate),
-                "-" if found is None else number(found.defect),
+                "-" if found is None else format_number(found.certificate),
+                "-" if found is None else format_number(found.defect),
             )
         )
     header = (

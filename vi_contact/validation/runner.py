@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.checks import check_word, explain_error, shown
+from ..core.checks import check_word, explain_error, quote
 from ..core.errors import InputError, ViContactError
 from .entry import RUN, SETTINGS, Entry, Missing, Mutant, Wanted, read_entry, refuse_units
 from .found import Found
@@ -127,7 +127,7 @@ def run_entry(
     try:
         found = entry.run.figures(inputs, setting)
         if not isinstance(found, Found):
-            raise TypeError(f"figures returned {shown(found)}: return a Found")
+            raise TypeError(f"figures returned {quote(found)}: return a Found")
     except Exception as error:  # of an entry, which may be anybody's and raise anything
         ended = f"{short}: its run ended in {type(error).__name__}"
         return Outcome(
