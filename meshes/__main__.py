@@ -13,7 +13,6 @@ from typing import Any, get_args, get_origin
 if not __package__:  # run as a folder of the source tree, maybe not installed
     sys.path[0] = str(Path(__file__).resolve().parents[1])
 
-from meshes.ball import BallMesh
 from meshes.disk import DiskMesh
 from meshes.raft import RaftMesh
 from vi_contact import meshes as room
@@ -23,7 +22,7 @@ from vi_contact.core.quantities import Quantity, read_quantities
 from vi_contact.meshes.gmsh_session import write
 
 NAMED = {name: getattr(room, name) for name in room.__all__ if name.endswith("Mesh")}
-OWN = {"ball": BallMesh, "disk": DiskMesh, "raft": RaftMesh}
+OWN = {"disk": DiskMesh, "raft": RaftMesh}
 SHAPES = OWN | {name.removesuffix("Mesh").lower(): one for name, one in NAMED.items()}
 
 

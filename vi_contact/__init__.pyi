@@ -53,6 +53,7 @@ from .practice import soil as soil
 from .practice import studies as studies
 from .practice.ground_motion import GroundMotion as GroundMotion
 from .practice.ground_motion import read_record as read_record
+from .run import BodyMotion as BodyMotion
 from .run import Contact as Contact
 from .run import CrossChecked as CrossChecked
 from .run import Energy as Energy
@@ -65,6 +66,7 @@ from .run import Resultants as Resultants
 from .run import Schedule as Schedule
 from .run import SectionForces as SectionForces
 from .run import Solution as Solution
+from .run import contact_values as contact_values
 from .run import cross_check as cross_check
 from .run import march as march
 from .run import march_many as march_many

@@ -534,7 +534,6 @@ def test_forms_that_cannot_be_a_body(comm: Any) -> None:
             {"mass": lambda u, v: ufl.inner(u, v) * ufl.dx + u[0] * v[1] * ufl.dx},
             "mass is not symmetric",
         ),
-        ({"mass": None}, "forms=… have no mass"),
         (
             {"stress": lambda u: ufl.tr(eps(u))},
             r"stress has shape \(\); return a tensor of shape \(2, 2\)",

@@ -6,8 +6,8 @@ from math import pi
 import numpy as np
 import pytest
 
-from meshes.ball import BallMesh
 from vi_contact.core.errors import InputError
+from vi_contact.meshes.ball import BallMesh
 from vi_contact.meshes.extract import MeshArrays, arrays_from_file, arrays_from_script
 from vi_contact.meshes.gmsh_session import write
 
@@ -106,5 +106,66 @@ def test_ball_leaves_gmsh_options_alone():
     ],
 )
 def test_sizes_that_make_no_ball_are_refused(wrong, word):
+    with pytest.raises(InputError, match=word):
+        BallMesh(**{**SMALL, **wrong})
+
+
+def test_half_ball_stands_on_its_anvil():
+    """Half of the sphere's volume, its plane of symmetry and its lowest node; below it a block of 2
+    L x L x L, all of whose sides are named, as finely meshed at the foot; two bodies."""
+    anvil = 0.02
+    mesh = arrays_from_script(BallMesh(**SMALL, half=True, anvil=anvil, coarsest=0.15 * RADIUS))
+    ball, block = mesh.cell_groups["ball"], mesh.cell_groups["anvil"]
+    assert np.array_equal(ball, ~block)
+    corners = mesh.points[mesh.cells]
+    sizes = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6.0
+    lack = 0.4 * 0.15**2
+    assert -lack < sizes[ball].sum() / (2.0 / 3.0 * pi * RADIUS**3) - 1.0 < 0.0
+    assert sizes[block].sum() == pytest.approx(2.0 * anvil**3, rel=1e-12)
+    assert not np.intersect1d(mesh.cells[ball], mesh.cells[block]).size
+    wanted = {"surface", "foot", "cap", "side_z"} | {
+        f"anvil_{name}" for name in ("top", "foot", "side_z", "far")
+    }
+    assert set(mesh.facet_groups) == wanted
+    for name, (axis, part) in {
+        "side_z": (2, pi * RADIUS**2),
+        "anvil_side_z": (2, 2.0 * anvil**2),
+        "anvil_top": (1, 2.0 * anvil**2),
+    }.items():
+        assert np.abs(mesh.points[mesh.facet_groups[name]][..., axis]).max() < 1e-15
+        assert area(mesh, name) == pytest.approx(part, rel=2.0 * lack)
+    assert area(mesh, "anvil_far") == pytest.approx(6.0 * anvil**2, rel=1e-12)
+    shell = mesh.points[np.unique(mesh.facet_groups["surface"])]
+    assert np.abs(np.linalg.norm(shell - (0.0, RADIUS, 0.0), axis=1) / RADIUS - 1.0).max() < 1e-12
+    assert np.linalg.norm(shell, axis=1).min() < 1e-15  # the lowest point is a node
+    foot, below = mesh.facet_groups["foot"], mesh.facet_groups["anvil_foot"]
+    assert area(mesh, "foot") == pytest.approx(pi / 2.0 * SMALL["foot"] ** 2, rel=0.1)
+    assert area(mesh, "anvil_foot") == pytest.approx(area(mesh, "foot"), rel=0.1)
+    assert area(mesh, "cap") > 2.0 * area(mesh, "foot")
+    assert len(below) == pytest.approx(len(foot), rel=0.2)
+    lifted = arrays_from_script(
+        BallMesh(**SMALL, half=True, anvil=anvil, coarsest=0.15 * RADIUS, height=1e-6)
+    )
+    assert lifted.points[np.unique(lifted.cells[lifted.cell_groups["ball"]]), 1].min() == (
+        pytest.approx(1e-6, rel=1e-9)
+    )
+
+
+def test_quarter_stands_on_a_quarter_of_the_anvil():
+    mesh = arrays_from_script(BallMesh(**SMALL, anvil=0.02))
+    assert {"anvil_side_x", "anvil_side_z", "side_x", "side_z"} <= set(mesh.facet_groups)
+    assert area(mesh, "anvil_side_x") == pytest.approx(0.02**2, rel=1e-12)
+    assert area(mesh, "anvil_far") == pytest.approx(3.0 * 0.02**2, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "word"),
+    [
+        ({"half": True, "eighth": True}, "half and eighth are both True"),
+        ({"anvil": 1.0e-3}, "give a depth of at least two feet"),
+        ({"anvil": "deep"}, "anvil is 'deep'"),
+    ],
+)
+def test_halves_and_anvils_that_cannot_be(wrong, word):
     with pytest.raises(InputError, match=word):
         BallMesh(**{**SMALL, **wrong})

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from meshes.ball import BallMesh
 from meshes.disk import DiskMesh
 from vi_contact.core.errors import InputError
+from vi_contact.meshes.ball import BallMesh
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.channel import ChannelMesh
 from vi_contact.meshes.extract import arrays_from_file

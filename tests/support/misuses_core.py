@@ -312,6 +312,16 @@ def values() -> Table:
                 },
                 "velocity": FLAG,
                 "acceleration": FLAG,
+                "nearest": FLAG,
+            },
+        ),
+        (
+            vc.BodyMotion,
+            {"name": "ball"},
+            {
+                "name": {"none": None, "spaces": "a b", "number": 0.5},
+                "bodies": {"number": 0.5, "texts": ("a",), "below": (-1,), "part": (0.5,)},
+                "about": but(VECTOR, "none"),
             },
         ),
         (

@@ -23,7 +23,6 @@ from graded import Pressed, even_then_growing, growing, pressed_half
 from hertz_line import HertzLine
 from mpi4py import MPI
 
-from meshes.ball import BallMesh
 from vi_contact.core.obstacles import AnalyticGap, HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.exact.hertz import HertzPoint, contact_modulus
@@ -32,6 +31,7 @@ from vi_contact.fem.body.loads import Prescribed, Traction
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.mesh.tagged_mesh import build_mesh
 from vi_contact.laws.materials import LinearElastic
+from vi_contact.meshes.ball import BallMesh
 from vi_contact.run.static import static_equilibrium
 from vi_contact.solvers.condensed import Condensed
 

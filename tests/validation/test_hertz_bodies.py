@@ -16,7 +16,6 @@ pytest.importorskip("dolfinx")
 from mpi4py import MPI
 from spheres import hertz
 
-from meshes.ball import BallMesh
 from vi_contact.core.problem import ContactProblem
 from vi_contact.exact.hertz import HertzPoint, contact_modulus
 from vi_contact.fem.body.assembly import assemble
@@ -25,6 +24,7 @@ from vi_contact.fem.contact.mortar import DualMortar
 from vi_contact.fem.contact.pairs import contact_pair
 from vi_contact.fem.mesh.tagged_mesh import build_mesh
 from vi_contact.laws.materials import LinearElastic
+from vi_contact.meshes.ball import BallMesh
 from vi_contact.meshes.extract import MeshArrays, add_arrays, arrays_from_script
 from vi_contact.run.static import static_equilibrium
 from vi_contact.solvers.condensed import Condensed

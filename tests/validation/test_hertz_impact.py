@@ -18,7 +18,6 @@ from inertia import inertia
 from mpi4py import MPI
 
 from demos.parts.problems.ball import QUARTERS, Ball, BallModel, build, hertz_motion
-from meshes.ball import BallMesh
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.ledger import energy_balance
@@ -30,6 +29,7 @@ from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.mesh.tagged_mesh import build_mesh
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.mass import Redistributed
+from vi_contact.meshes.ball import BallMesh
 from vi_contact.run.march import march
 
 COMM = MPI.COMM_WORLD

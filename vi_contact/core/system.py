@@ -236,6 +236,8 @@ class SemiDiscreteSystem:
             else may shake it.
         companions: motions among its loads that are marched beside the run, with its scheme and
             time steps.
+        statics_only: True when nobody said its mass: M then stands for a density of one, by which
+            static stages weigh motions against each other, and all else refuses the system.
     """
 
     algebra: Algebra
@@ -254,6 +256,7 @@ class SemiDiscreteSystem:
     notes: tuple[str, ...] = ()
     absolute: bool = False
     companions: tuple[Companion, ...] = ()
+    statics_only: bool = False
     _cache: dict[str, Any] = field(init=False, default_factory=dict, compare=False, repr=False)
     _products: dict[str, Remembered] = field(
         init=False, default_factory=dict, compare=False, repr=False
@@ -289,6 +292,14 @@ class SemiDiscreteSystem:
     def rows(self) -> int:
         """Return how many unknowns this rank owns."""
         return len(self.u0)
+
+    def refuse_statics_only(self, owner: str) -> None:
+        """Raise InputError where nobody said the mass; ``owner`` asks for it."""
+        if self.statics_only:
+            raise InputError(
+                f"{owner}: the forms=… of the system have no mass, which static stages alone do "
+                "without: give fem.Forms(…, mass=), or a material for its density"
+            )
 
     def kinetic_energy(self, v: Array) -> float:
         """Return ½ vᵀ M v [J]."""

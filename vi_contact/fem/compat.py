@@ -466,3 +466,17 @@ def nodal(space: Any) -> bool:
 def constrains(bc: Any, space: Any) -> bool:
     """Say whether this is a Dirichlet condition on a space, or on a component of it."""
     return hasattr(bc, "function_space") and bool(_bare(space).contains(_bare(bc.function_space)))
+
+
+def evaluate(field: Any, point: Any, cell: int) -> npt.NDArray[np.float64]:
+    """Return the components of a function at a point (3,) [m] in a local cell, (bs,)."""
+    return np.asarray(field.eval(np.reshape(point, (1, 3)), [cell]), dtype=float).ravel()
+
+
+def continuous(space: Any) -> bool:
+    """Say whether the fields of a space do not jump between cells."""
+    element = space.ufl_element()
+    if not _BASIX_ELEMENTS:  # of vectors it is the one of their components that knows
+        parts = element.sub_elements()
+        element = parts[0] if parts else element
+    return element in ufl.H1

@@ -47,6 +47,7 @@ def with_weight(
             a constant load of nearly its size: of ``BodyForce``, or of this function.
     """
     owner = "with_weight"
+    system.refuse_statics_only(owner)
     d = system.influence.shape[1]
     if direction is None:
         direction = (*[0.0] * (d - 1), -1.0)

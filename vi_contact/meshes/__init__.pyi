@@ -1,3 +1,4 @@
+from .ball import BallMesh as BallMesh
 from .block import BlockMesh as BlockMesh
 from .channel import ChannelMesh as ChannelMesh
 from .cut import CutOpen as CutOpen

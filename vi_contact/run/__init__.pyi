@@ -1,3 +1,5 @@
+from .contact_values import ContactValues as ContactValues
+from .contact_values import contact_values as contact_values
 from .cross_check import CrossChecked as CrossChecked
 from .cross_check import cross_check as cross_check
 from .files.reading import RunFolder as RunFolder
@@ -5,6 +7,7 @@ from .files.reading import read_run as read_run
 from .march import march as march
 from .march_many import march_many as march_many
 from .method import with_defaults as with_defaults
+from .recorders import BodyMotion as BodyMotion
 from .recorders import Contact as Contact
 from .recorders import Energy as Energy
 from .recorders import LargestStrain as LargestStrain

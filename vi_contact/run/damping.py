@@ -66,6 +66,7 @@ def first_modes(problem: ContactProblem) -> FirstModes:
     Collective.
     """
     check_problem_given("first_modes", problem)
+    problem.system.refuse_statics_only("first_modes")
     modes = _recall_modes(problem)
     if modes is None:
         modes = _compute_modes(problem)

@@ -98,6 +98,7 @@ def choose_method(
         },
     )
     check_methods(owner, first, escalation, tolerance)
+    problem.system.refuse_statics_only(owner)
 
     # Defaults of what is not said.
     problem, scheme = with_defaults(problem, scheme)

@@ -34,6 +34,7 @@ def lowest_frequency(
     Raises:
         InputError: the body floats (K is singular), or the iteration does not settle.
     """
+    system.refuse_statics_only("lowest_frequency")
     if system.floating:
         raise InputError(
             "the body is not held, so its lowest frequency is zero: clamp a part of it"

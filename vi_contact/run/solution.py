@@ -60,6 +60,8 @@ RUN = (
         "steps_in_contact",
     ),
     Line("smallest gap", "{smallest_gap:.3e} m", "steps_in_contact"),
+    Line("friction used, T/(mu N)", "{used}", "used"),
+    Line("closed points that slip", "{slid}", "slid"),
 )
 ENERGY = (
     Line("", "  energy ledger [J]", "energy"),
@@ -106,7 +108,7 @@ class Solution:
         frame: int | None = None,
         continuous: bool = False,
     ) -> Any:
-        """Return "u", "v", "stress" or "contact_pressure" as a DOLFINx Function. Collective.
+        """Return "u", "v", "stress", "contact_pressure", … as a DOLFINx Function. Collective.
 
         It is ``fem.as_function`` of the end state, or ``fem.read_function`` of a frame in the run
         folder.
@@ -237,7 +239,17 @@ def _put_in_words(facts: Mapping[str, Any]) -> dict[str, Any]:
         "and_output": ", output and the cross-check" if facts["cross_check"] else " and output",
         "halved_steps": facts["halved_steps"] or None,
         "reason": facts["reason"] or None,
+        "used": _put_share_in_words(facts.get("friction_used")),
+        "slid": _put_share_in_words(facts.get("slipping")),
     }
+
+
+def _put_share_in_words(share: Mapping[str, float | None] | None) -> str | None:
+    """Return the largest share of a run and the last one in words, None for none."""
+    if share is None or share["largest"] is None:
+        return None
+    end = "open at the end" if share["end"] is None else f"{share['end']:.3f} at the end"
+    return f"{share['largest']:.3f} at most, {end}"
 
 
 def _fill_in(lines: Sequence[Line], words: Mapping[str, Any]) -> list[tuple[str, str]]:

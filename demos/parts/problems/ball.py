@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import betaincinv
 
-from meshes.ball import BallMesh
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.obstacles import HalfSpace
@@ -28,6 +27,7 @@ from vi_contact.fem.body.loads import Prescribed
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.mesh.tagged_mesh import build_mesh
 from vi_contact.laws.materials import LinearElastic
+from vi_contact.meshes.ball import BallMesh
 
 QUARTERS = 4.0
 FOOT = 1.3  # contact side over the largest contact radius

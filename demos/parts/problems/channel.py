@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from demos.parts.problems.channel_sides import RockBelow, Rollers, Sides
-from vi_contact.core.algebra import Array, Indices, Mask, from_each
+from vi_contact.core.algebra import Array, Mask, from_each
 from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.protocols import Excitation, FrictionLaw, Frictionless, ImpactLaw, MassLaw
@@ -36,6 +36,7 @@ from vi_contact.laws.weight import with_weight
 from vi_contact.meshes.channel import ChannelMesh
 from vi_contact.practice.soil.moving_base import BaseMotion
 from vi_contact.run.recorders import Contact, Energy, Probe
+from vi_contact.run.recorders.probe import Places
 from vi_contact.solvers.volume.route import Volume
 from vi_contact.solvers.volume.snes import ReducedNewton
 
@@ -175,12 +176,12 @@ class SoilProbe(Probe):
     InputError for a point that is not at the interface.
     """
 
-    def _find_nodes(self, problem: ContactProblem, points: Array) -> Indices:
-        """Return the numbers of the nodes of side 2 that face those of side 1.
+    def _find_places(self, problem: ContactProblem, points: Array) -> Places:
+        """Return the nodes of side 2 that face those of side 1.
 
         They are the nearest where divisions differ.
         """
-        nodes = super()._find_nodes(problem, points).tolist()
+        nodes = problem.system.space.find_nodes(points).tolist()
         surface = problem.surface
         faced: dict[int, int] = {}
         for part in surface.parts if isinstance(surface, FemSurface) else ():
@@ -195,7 +196,7 @@ class SoilProbe(Probe):
                 "a soil probe is not at the interface with the channel: give points of the "
                 "channel's outline"
             )
-        return np.array([faced[node] for node in nodes], dtype=np.int64)
+        return Places.at_nodes(np.array([faced[node] for node in nodes], dtype=np.int64))
 
 
 @dataclass(frozen=True)

@@ -99,7 +99,8 @@ def assemble(
         material: LinearElastic, Orthotropic or fem.Heterogeneous, or (cells, material) pairs that
             cover the mesh.
         forms: the user's own weak forms, ``fem.Forms``; a material beside them gives the density
-            where they have no mass, and the wave speeds that dashpots and free fields need.
+            where they have no mass, and the wave speeds that dashpots and free fields need. Without
+            a mass at all the system is for static stages alone.
         section: PlaneStrain() by default in 2D (Solid() in 3D); PlaneStress(thickness) for panels.
         space: the user's own DOLFINx space V of the displacement, which sets the degree.
         bcs: ``dirichletbc`` objects on V, a space like it, or V.sub(i). They keep their present
@@ -257,6 +258,7 @@ def assemble(
                 *(boundary.companions for boundary in acting),
             )
         ),
+        statics_only=body.statics_only,
     )
     body.own(system)
 

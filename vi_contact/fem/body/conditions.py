@@ -15,11 +15,11 @@ from dolfinx.mesh import Mesh
 from ...core.checks import instance, refuse
 from ...core.errors import InputError
 from ..mesh.communicators import MpiComm
-from ..mesh.group_checks import facets_of
+from ..mesh.group_checks import cells_of, facets_of
 from ..mesh.tagged_mesh import Facets
 from .dashpots import Dashpots
 from .linear_forms import LOADS
-from .loads import Prescribed
+from .loads import BodyForce, Prescribed
 from .ties import Tied
 
 OWNER = "assemble"
@@ -97,6 +97,7 @@ def gather_conditions(
         facets_of(OWNER, meaning, group, mesh)
     _refuse_repeated(loads=given["loads"], dashpots=given["dashpots"])
     _refuse_empty(mesh, groups)
+    _refuse_empty(mesh, _list_force_groups(mesh, given["loads"]), "cell")
     conditions = Conditions(
         held=(*rest, *given["prescribed"]),
         prescribed=given["prescribed"],
@@ -132,20 +133,31 @@ def _refuse_repeated(**lists: Sequence[Any]) -> None:
                 )
 
 
-def _refuse_empty(mesh: Mesh, groups: Sequence[tuple[str, Any]]) -> None:
-    """Raise InputError, on all ranks, for a boundary group without facets on any rank.
+def _list_force_groups(mesh: Mesh, loads: Sequence[Any]) -> list[tuple[str, Any]]:
+    """Return ("loads", group) of the cells that body forces act on, checked to be of the mesh."""
+    groups: list[tuple[str, Any]] = []
+    for load in loads:
+        if isinstance(load, BodyForce) and load.cells is not None:
+            groups.append(("loads", cells_of(OWNER, "the cells of loads", load.cells, mesh)))
+    return groups
+
+
+def _refuse_empty(mesh: Mesh, groups: Sequence[tuple[str, Any]], kind: str = "boundary") -> None:
+    """Raise InputError, on all ranks, for a group without facets or cells on any rank.
 
     Such a group holds and loads nothing, which is seldom meant. Collective.
 
     Args:
         mesh: that of the body.
         groups: (name of the argument, group) of all that are given.
+        kind: "boundary" or "cell".
     """
+    members = "facets" if kind == "boundary" else "cells"
     own = np.array([len(group.indices) for _, group in groups], dtype=float)
     for (name, group), count in zip(groups, mesh.comm.allreduce(own), strict=True):
         if not count:
             raise InputError(
-                f"assemble: the boundary group '{group.name}' of {name} has no facets, so it has "
+                f"assemble: the {kind} group '{group.name}' of {name} has no {members}, so it has "
                 "no effect; correct the group, or leave it out"
             )
 

@@ -194,7 +194,7 @@ def refuse_contradictions(space: Any) -> None:
         values[support.places], _ = support.at(space.points, 0.0, 0)
     for i, j in product(np.flatnonzero(~is_given), np.flatnonzero(is_given)):
         stated = space.prescribed[i]
-        moves = stated.moves and callable(stated.displacement)
+        moves = stated.moves and callable(stated.motions[0])
         # NaN where one of them holds nothing
         apart = np.abs(held[i] - held[j])
         counts = np.array([np.isfinite(values).sum() for values in (apart, held[i], held[j])])

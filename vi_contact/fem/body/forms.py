@@ -62,6 +62,7 @@ class ElasticForms:
     tells_stress = True
     symmetric = True
     own_damping = False
+    statics_only = False
     notes: tuple[str, ...] = ()
 
     def __init__(

@@ -14,11 +14,18 @@ import ufl
 from dolfinx.mesh import Mesh
 
 from ...core.algebra import Array, Comm, Indices
-from ...core.checks import explain_error, function, number, optional, quote, refuse
+from ...core.checks import explain_error, function, number, optional, quote, refuse, several
+from ...core.errors import InputError
 from ...core.quantities import Unit
 from .. import compat
-from ..mesh.group_checks import check_components, check_field, components_of, facets_of
-from ..mesh.tagged_mesh import Facets
+from ..mesh.group_checks import (
+    cells_of,
+    check_components,
+    check_field,
+    components_of,
+    facets_of,
+)
+from ..mesh.tagged_mesh import Cells, Facets
 
 Field = Callable[[Array, float], Array]
 Value = tuple[float, ...] | Field
@@ -85,6 +92,25 @@ def _zero(points: Array, t: float) -> Array:
 
 
 @dataclass(frozen=True)
+class _Scaled:
+    """Multiply a field constant in time by a function of the time.
+
+    Attributes:
+        value: (d,) numbers, or a function of points, asked at t = 0.
+        factor: f(t).
+    """
+
+    value: Value
+    factor: Callable[[float], float]
+
+    def __call__(self, points: Array, t: float) -> Array:
+        """Return f(t) times the field at points (k, d)."""
+        value = self.value
+        field = value(points, 0.0) if callable(value) else np.tile(value, (len(points), 1))
+        return float(self.factor(t)) * np.asarray(field)
+
+
+@dataclass(frozen=True)
 class Prescribed:
     """Prescribe u_i = U_i(x, t) on facets, with the velocity and acceleration of the same motion.
 
@@ -98,6 +124,10 @@ class Prescribed:
         acceleration: the like, U''.
         components: which displacement components are prescribed, all when None; the others stay
             free (rollers).
+        history: a factor f(t) of a displacement constant in time, U = f(t) U_0(x), as that of
+            loads. One function is enough for load steps, which ask for no rates; for motion in time
+            give three, (f, f', f''), which make U' = f' U_0 and U'' = f'' U_0 as well. A
+            displacement that is a function is then asked once, at t = 0.
     """
 
     facets: Facets
@@ -105,12 +135,43 @@ class Prescribed:
     velocity: Annotated[Value, Unit("m/s")] = _zero
     acceleration: Annotated[Value, Unit("m/s²")] = _zero
     components: tuple[int, ...] | None = None
+    history: Callable[[float], float] | tuple[Callable[[float], float], ...] | None = None
 
     def __post_init__(self) -> None:
         facets_of("Prescribed", "facets", self.facets)
         for name in ("displacement", "velocity", "acceleration"):
             check_field("Prescribed", name, getattr(self, name))
         check_components("Prescribed", self.components)
+        if self.history is not None:
+            self._check_history()
+
+    def _check_history(self) -> None:
+        """Raise InputError for a history that is no function or three, or has nothing to turn."""
+        remedy = "give a function f of the time [s], or three, (f, f', f'')"
+        for factor in self._list_factors(remedy):
+            function("Prescribed", "history", factor, remedy)
+        if self.displacement is _zero:
+            raise InputError(
+                "Prescribed: history is a factor of the displacement, which is left out; give it"
+            )
+        if self.velocity is not _zero or self.acceleration is not _zero:
+            raise InputError(
+                "Prescribed has a history, and a velocity or an acceleration of its own; give "
+                "history=(f, f', f'') in their place"
+            )
+
+    def _list_factors(self, remedy: str) -> tuple[Any, ...]:
+        """Return f, or f, f' and f''; InputError, which ends with the remedy, for another number.
+
+        Args:
+            remedy: what to give instead.
+        """
+        if callable(self.history):
+            return (self.history,)
+        factors = several("Prescribed", "history", self.history, remedy)
+        if len(factors) != 3:
+            raise InputError(f"Prescribed: history has {len(factors)} members; {remedy}")
+        return factors
 
     @property
     def name(self) -> str:
@@ -120,7 +181,14 @@ class Prescribed:
     @property
     def motions(self) -> tuple[Value, Value, Value]:
         """Return the motion and its rates (U, U', U'')."""
-        return self.displacement, self.velocity, self.acceleration
+        if self.history is None:
+            return self.displacement, self.velocity, self.acceleration
+        factors = self._list_factors("give three")
+        motions: list[Value] = [_Scaled(self.displacement, factor) for factor in factors]
+        if len(motions) == 1:  # load steps ask for no rates
+            motions += [_zero, _zero]
+        motion, velocity, acceleration = motions
+        return motion, velocity, acceleration
 
     @property
     def moves(self) -> bool:
@@ -339,7 +407,24 @@ class BodyForce(ActingLoad):
     """Apply a volume force f_i(x, t) [N/m³].
 
     The weight of a material is BodyForce((0, -rho * 9.80665)).
+
+    Args:
+        value: (d,) numbers, or a function of points (k, d) [m] and the time [s] -> (k, d).
+        history: factor f(t) of the value at t = 0 s.
+        cells: the group of cells on which it acts; all of the mesh when None.
     """
 
     value: Annotated[Value, Unit("N/m³")]
     history: Callable[[float], float] | None = None
+    cells: Cells | None = None
+
+    def __post_init__(self) -> None:
+        optional(cells_of, "BodyForce", "cells", self.cells)
+        super().__post_init__()
+
+    def measure(self, mesh: Mesh) -> Any:
+        """Return the measure of the cells."""
+        if self.cells is None:
+            return ufl.dx
+        cells = cells_of("BodyForce", "cells", self.cells, mesh)
+        return compat.measure(mesh, mesh.topology.dim, cells.indices)

@@ -36,7 +36,7 @@ class Forms:
         stiffness: the form of K [N/m]. One that is not symmetric has no energy, and is for Volume()
             and Lemke().
         mass: the form of M [kg], symmetric and positive; None: the density of ``assemble(…,
-            material)``.
+            material)``, and without a material a system for static stages alone.
         damping: the form of C [N s/m]; None: that of ``assemble(…, damping=)``, Rayleigh on these M
             and K, or KelvinVoigt; both add up.
         stress: u -> stress tensor [Pa], (d, d), or in the plane (3, 3) with sigma_zz; von Mises
@@ -87,15 +87,11 @@ class OwnForms(ElasticForms):
             InputError: as for ``Forms``.
         """
         super().__init__(space, materials, section, damping)
-        if given.mass is None and not materials:
-            raise InputError(
-                "assemble: forms=… have no mass; give Forms(…, mass=), or a material for its "
-                "density"
-            )
         self._given = given
+        self.statics_only = given.mass is None and not materials
         self.tells_stress = given.stress is not None
         self.own_damping = given.damping is not None
-        self.densities = given.mass is None and given.damping is None
+        self.densities = bool(materials) and given.mass is None and given.damping is None
 
         # C = alpha M + beta K + viscous stresses + the user's own, of which any may be missing
         rayleigh = damping if isinstance(damping, Rayleigh) else Rayleigh(0.0, 0.0)
@@ -105,7 +101,8 @@ class OwnForms(ElasticForms):
         if given.stress is not None:
             refuse_stress(given.stress, space)
         self._forms = {
-            name: self._read_form(name) or super(OwnForms, self).bilinear(name) for name in "KM"
+            "K": self._read_form("K"),
+            "M": self._read_form("M") or self._weigh_by_density(),
         }
         dampers = [
             compat.constant(space.mesh, share) * self._forms[name]
@@ -133,9 +130,23 @@ class OwnForms(ElasticForms):
             return None
         return form_of(f"Forms: {ROLES[name]}", call, self.space, self.u, self.v)
 
+    def _weigh_by_density(self) -> Any:
+        """Return the form of M by the density of the material; of one where there is none.
+
+        Static stages weigh motions of a body that nothing holds by it: any density will do.
+        """
+        if self.statics_only:
+            return ufl.inner(self.u, self.v) * ufl.dx
+        return super().bilinear("M")
+
     def _describe(self, material: bool) -> tuple[str, ...]:
         """Return sentences on what comes from where; ``material``: whether there is one beside."""
-        mass = "the density of the material" if self._given.mass is None else "a form"
+        if self.statics_only:
+            mass = "nothing, for static stages alone"
+        elif self._given.mass is None:
+            mass = "the density of the material"
+        else:
+            mass = "a form"
         stress = "a" if self.tells_stress else "no"
         waves = "the material beside them" if material else "no material"
         notes = [

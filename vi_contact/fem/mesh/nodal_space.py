@@ -116,7 +116,24 @@ class NodalSpace:
         Raises:
             InputError: a point farther from every node than 5 % of the diagonal of the body.
         """
+        numbers, _ = self.find_nearest(points)
+        return numbers
+
+    def find_nearest(self, points: Array, *, anywhere: bool = False) -> tuple[Indices, Array]:
+        """Find the nodes as ``find_nodes`` does, and how far they are. Collective.
+
+        Args:
+            points: (k, d) [m].
+            anywhere: whether points far from all nodes are let be.
+
+        Returns:
+            (k,) numbers of nodes and (k,) distances [m], the same on all ranks.
+
+        Raises:
+            InputError: as for ``find_nodes``, unless ``anywhere``.
+        """
         numbers = np.empty(len(points), dtype=np.int64)
+        distances = np.zeros(len(points))
         for i, point in enumerate(np.atleast_2d(np.asarray(points, dtype=float))):
             if point.shape != (self.dimension,):
                 raise InputError(
@@ -124,7 +141,7 @@ class NodalSpace:
                 )
             distance = np.linalg.norm(self.points - point, axis=1)
             nearest = -largest(self.comm, -np.min(distance, initial=np.inf))
-            if nearest > MEANT * self.size:
+            if nearest > MEANT * self.size and not anywhere:
                 raise InputError(
                     f"point {describe_point(point)} is {nearest:.3g} m away from the nearest node: "
                     "give a point of the body"
@@ -132,7 +149,8 @@ class NodalSpace:
             close = self.nodes[distance <= nearest + 1e-9 * self.size]
             least = float(np.min(close, initial=np.iinfo(np.int64).max))
             numbers[i] = -int(largest(self.comm, -least))
-        return numbers
+            distances[i] = nearest
+        return numbers, distances
 
 
 def bounding_box(comm: Comm, points: Array) -> float:

@@ -49,6 +49,8 @@ def work_beyond(
     # the simplices on this side, and their corners as points (p, n, d)
     d = space.dimension
     surface = isinstance(load, Traction)
+    if isinstance(load, BodyForce) and load.cells is not None:  # the force acts on these alone
+        crossed = crossed & np.isin(np.arange(len(crossed)), load.cells.indices)
     cells, nodes = _list_entities(
         space.mesh, crossed, load.facets.indices if isinstance(load, Traction) else None
     )

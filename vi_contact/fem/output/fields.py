@@ -11,15 +11,17 @@ closed nodes stick.
 import logging
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import numpy as np
 
 from ...core.algebra import Array, Indices, Mask, from_each, on_first
 from ...core.arguments import check_fields
+from ...core.checks import column_name
+from ...core.errors import InputError
 from ...core.files import (
     FIELDS,
     FIELDS_INDEX,
@@ -37,6 +39,9 @@ from ...core.quantities import Positive
 from ...core.step import Report, State
 from ..matrices.own_matrices import MatrixSpace
 from ..mesh.nodal_space import NodalSpace
+
+if TYPE_CHECKING:
+    from .own_functions import OwnFunctions
 
 log = logging.getLogger(__name__)
 
@@ -105,6 +110,7 @@ _CELLS = {
 
 _VECTORS = ("u", "v", "a")
 _RUBBING = ("contact_traction_t", "slip")
+TAKEN = (*_VECTORS, *_RUBBING, "contact_pressure", "contact_status", "von_mises")
 
 
 @dataclass(frozen=True)
@@ -115,13 +121,25 @@ class XDMF:
         every: a frame each so many steps.
         frames_per_file: each time so many frames have files of their own they are put into one:
             some file systems want few files.
+        functions: name -> a DOLFINx Function of the user's on the mesh of the body, which every
+            frame has with the values of its moment; or a function of the state (``State``) that
+            returns one. It is of a continuous Lagrange space, interpolated at the nodes, or
+            constant in each cell; a number, a vector or a tensor.
     """
 
     every: Annotated[int, Positive] = 10
     frames_per_file: Annotated[int, Positive] = 1
+    functions: Mapping[str, Any] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
         check_fields(self)
+        for name in self.functions:
+            column_name("name of a Function", name)
+            if name in TAKEN:
+                raise InputError(
+                    f"XDMF: functions has the name '{name}', which frames have already; give "
+                    "another"
+                )
 
     def open(
         self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]
@@ -135,11 +153,21 @@ class XDMF:
                 the folder stay, and all others are removed.
         """
         space = problem.system.space
+        own = None
         if isinstance(space, MatrixSpace):
+            if self.functions:
+                raise InputError(
+                    "XDMF: functions are on a mesh, and the system was not made of one; leave them "
+                    "out"
+                )
             cells = Cells("Polyvertex", space.nodes[:, None], space.nodes)
         else:
+            from .own_functions import OwnFunctions  # late: the other frames need no DOLFINx
+
             cells = _cells_of_body(problem)
-        return FrameWriter(problem, folder, kept, self.frames_per_file, cells)
+            if self.functions:
+                own = OwnFunctions(problem, self.functions)
+        return FrameWriter(problem, folder, kept, self.frames_per_file, cells, own)
 
 
 @dataclass(frozen=True)
@@ -174,6 +202,7 @@ class FrameWriter:
         kept: Mapping[int, float],
         per_file: int,
         cells: Cells,
+        own: "OwnFunctions | None" = None,
     ) -> None:
         """Write the mesh, and the index of the frames that stay. Collective.
 
@@ -183,6 +212,7 @@ class FrameWriter:
             kept: step -> time [s] of frames with which the run goes on.
             per_file: how many frames are collected in a file.
             cells: those of the mesh, or points.
+            own: the user's Functions, None without.
         """
         space: Any = problem.system.space
         self._problem = problem
@@ -193,6 +223,8 @@ class FrameWriter:
         self._type = cells.kind
         self._cell_numbers = cells.numbers
         self._von_mises = cells.von_mises
+        self._own = own
+        self._own_names: dict[int, list[str]] = {}  # of the frame of each step
         points = on_first(space.comm, space.nodes, _pad_axes(space.points))
         rows = on_first(space.comm, self._cell_numbers, cells.nodes)
         self._shape = (len(points), *rows.shape)
@@ -267,38 +299,26 @@ class FrameWriter:
             problem, state, np.where(state.active, np.where(slipping, 3, 2), 1)
         )
         if problem.frictional:
-            vectors += [between(problem, nodal) for nodal in self._compute_rubbing(state)]
+            vectors += [between(problem, nodal) for nodal in compute_rubbing(problem, state)]
 
-        # rank 0 writes the rows of all, in the order of ``_names``
+        # rank 0 writes the rows of all, in the order of ``_names``, and the user's Functions
         rows = np.hstack([*(_pad_axes(nodal) for nodal in vectors), pressure, status])
+        functions = {} if self._own is None else self._own.gather_values(state)
         on_root(
-            space.comm, partial(self._write, state, on_first(space.comm, space.nodes, rows), stress)
+            space.comm,
+            partial(self._write, state, on_first(space.comm, space.nodes, rows), stress, functions),
         )
 
-    def _compute_rubbing(self, state: State) -> list[Array]:
-        """Return tangential traction [Pa] and slip [m] at the owned nodes, (k, d) each."""
-        surface = self._problem.surface
-        slip = surface.slip(state.u, state.t)
-        r_t = np.zeros_like(slip) if state.r_t is None else state.r_t
-        return [self._along_axes(values) for values in (r_t / surface.weights[:, None], slip)]
-
-    def _along_axes(self, tangential: Array) -> Array:
-        """Return vectors at the owned nodes (k, d) of components in nodal tangents (m, d - 1)."""
-        space = self._space
-        surface = self._problem.surface
-        in_frames = surface.reaction_load(np.zeros(surface.count), len(space.ids), tangential)
-        # forces and motions turn alike here, as tangents are at right angles to all that is oblique
-        along = surface.along_axes(in_frames)
-        # of the free unknowns alone: what is prescribed or follows others has no part in it
-        return NodalSpace.expand(space, along, 0.0)
-
-    def _write(self, state: State, nodal: Array, stress: Array | None) -> None:
+    def _write(
+        self, state: State, nodal: Array, stress: Array | None, functions: Mapping[str, Array]
+    ) -> None:
         """Write a frame and the index that names it, on rank 0.
 
         Args:
             state: that of the frame.
             nodal: (nodes, 3 vectors + 2) values at all nodes.
             stress: (cells,) von Mises stresses [Pa], None without.
+            functions: values of the user's Functions by name, (nodes or cells, components).
         """
 
         def fill(file: Any) -> None:
@@ -308,11 +328,14 @@ class FrameWriter:
             file["contact_status"] = nodal[:, -1].astype(np.int32)
             if stress is not None:
                 file["von_mises"] = stress
+            for name, values in functions.items():
+                file[name] = values
 
         path = inner_folder(self._folder, FIELDS) / f"frame_{state.k:06d}.h5"
         hdf5_atomically(path, fill)
         self._times[state.k] = state.t
         self._places[state.k] = (path, "/")
+        self._own_names[state.k] = list(functions)
         single = [k for k, (_, group) in self._places.items() if group == "/"]
         full = len(single) >= self._per_file > 1
         if full:
@@ -331,6 +354,21 @@ class FrameWriter:
         )
         write_atomically(self._folder / FIELDS_INDEX, text.encode())
 
+    def _find_own_kinds(self, k: int) -> dict[str, Any]:
+        """Return which of the user's Functions the frame of a step has, and what they are.
+
+        A frame of an earlier run, which this one goes on with, may have none.
+        """
+        if self._own is None:
+            return {}
+        if k not in self._own_names:
+            path, group = self._places[k]
+            with open_hdf5(path) as file:
+                self._own_names[k] = [name for name in self._own.names if name in file[group]]
+        # what the user's function of the state returns is known from its first frame on
+        kinds = self._own.kinds
+        return {name: kinds[name] for name in self._own_names[k] if name in kinds}
+
     def _describe_frame(self, k: int, t: float) -> str:
         """Return XDMF's Grid of the frame of step k at time t [s]."""
         nodes, cells, corners = self._shape
@@ -339,7 +377,10 @@ class FrameWriter:
         frame = f"{FIELDS}/{path.name}:{group.rstrip('/')}"
 
         def describe(name: str, center: str, *shape: int, **number: Any) -> str:
-            kind = "Vector" if len(shape) == 2 else "Scalar"
+            # a row of nine components is a tensor, one of three a vector
+            kind = {1: "Scalar", 2: "Vector"}.get(len(shape), "Tensor")
+            if shape[1:] == (9,):
+                kind = "Tensor"
             item = _describe_data(shape, f"{frame}/{name}", **number)
             return (
                 f'<Attribute Name="{name}" AttributeType="{kind}" '
@@ -351,6 +392,9 @@ class FrameWriter:
         attributes.append(describe("contact_status", "Node", nodes, number="Int", size=4))
         if self._von_mises is not None:
             attributes.append(describe("von_mises", "Cell", cells))
+        for name, own_kind in self._find_own_kinds(k).items():
+            shape = (cells if own_kind.in_cells else nodes, *own_kind.components)
+            attributes.append(describe(name, "Cell" if own_kind.in_cells else "Node", *shape))
         return (
             f'<Grid Name="step {k}" GridType="Uniform"><Time Value="{t!r}"/>\n'
             f'<Topology TopologyType="{self._type}" NumberOfElements="{cells}" '
@@ -383,6 +427,44 @@ def nodal_contact(problem: ContactProblem, state: State, status: Array) -> tuple
     pressure[blocks[order], 0] = pressures[order]
     np.maximum.at(highest[:, 0], blocks, status)
     return between(problem, pressure), between(problem, highest, np.min)
+
+
+def compute_rubbing(problem: ContactProblem, state: State) -> tuple[Array, Array]:
+    """Return tangential traction [Pa] and slip [m] along the axes at the owned nodes, (k, d) each.
+
+    The traction is that of the body on its support; both are zero off the contact surface.
+    """
+    surface = problem.surface
+    slip = surface.slip(state.u, state.t)
+    r_t = np.zeros_like(slip) if state.r_t is None else state.r_t
+    traction = _turn_to_axes(problem, r_t / surface.weights[:, None])
+    return traction, _turn_to_axes(problem, slip)
+
+
+def _turn_to_axes(problem: ContactProblem, tangential: Array) -> Array:
+    """Return vectors at the owned nodes (k, d) of components in nodal tangents (m, d - 1)."""
+    space = cast(NodalSpace, problem.system.space)
+    surface = problem.surface
+    in_frames = surface.reaction_load(np.zeros(surface.count), len(space.ids), tangential)
+    # forces and motions turn alike here, as tangents are at right angles to all that is oblique
+    along = surface.along_axes(in_frames)
+    # of the free unknowns alone: what is prescribed or follows others has no part in it
+    return NodalSpace.expand(space, along, 0.0)
+
+
+def compute_gap(problem: ContactProblem, state: State) -> Array:
+    """Return the gap [m] at the owned nodes, (k, 1): of several faces the smallest. Collective.
+
+    It is zero off the contact surface, and at nodes without a condition. It grows by what
+    compliant conditions are pressed together.
+    """
+    space = cast(NodalSpace, problem.system.space)
+    surface = problem.surface
+    gaps = surface.gap(state.t) - surface.normal_values(state.u) + surface.compliance * state.r_n
+    gap = np.full((len(space.nodes), 1), np.inf)
+    np.minimum.at(gap[:, 0], blocks_of_conditions(problem), gaps)
+    gap[~np.isfinite(gap)] = 0.0
+    return between(problem, gap)
 
 
 def blocks_of_conditions(problem: ContactProblem) -> Indices:

@@ -28,9 +28,15 @@ from ...core.state_checks import check_problem_given, check_sizes
 from ...core.step import State
 from .. import compat
 from ..body.space import FemSpace, space_of, warn_of_other_matrices
-from .fields import between, blocks_of_conditions, nodal_contact
+from .fields import (
+    between,
+    blocks_of_conditions,
+    compute_gap,
+    compute_rubbing,
+    nodal_contact,
+)
 
-NAMES = ("u", "v", "stress", "contact_pressure")
+NAMES = ("u", "v", "stress", "contact_pressure", "contact_traction_t", "slip", "contact_gap")
 ACCURACY = 1e-13  # of a projection, in its residual
 SAME = 1e-9  # of the size of the mesh, and of the longest time
 
@@ -40,14 +46,19 @@ def as_function(
 ) -> Any:
     """Return a state as a DOLFINx Function. Collective.
 
-    Where a node of the contact boundary has no pressure of its own, as one that is held, the
-    function has the mean of those of its neighbours, so that the error of a right pressure falls
-    with the size of the facets there too. Every call makes a Function of its own.
+    Quantities of the contact are zero off the contact surface.
+
+    Where a node of the contact boundary has no pressure or traction of its own, as one that is
+    held, the function has the mean of those of its neighbours, so that the error of a right
+    pressure falls with the size of the facets there too. Its gap and slip are zero. Every call
+    makes a Function of its own.
 
     Args:
         problem: the problem of the state.
         state: of simulate, march, static_equilibrium or quasi_static of this problem.
-        name: "u" [m], "v" [m/s], "stress" [Pa] (d, d) or "contact_pressure" [Pa].
+        name: "u" [m], "v" [m/s], "stress" [Pa] (d, d), "contact_pressure" [Pa], "contact_gap" [m],
+            or a vector along the axes: "contact_traction_t" [Pa], the tangential traction of the
+            body on its support, and "slip" [m], its tangential displacement there.
         continuous: whether the stress is projected onto P1, Q1, P2 or Q2, ∫ sigma_h : tau = ∫
             sigma(u) : tau; else onto discontinuous fields.
 
@@ -56,18 +67,36 @@ def as_function(
     """
     space = _check_request("as_function", problem, name, continuous)
     check_sizes("as_function", problem, state)
-    if name != "contact_pressure":
+    if name in ("u", "v", "stress"):
         if name == "v":
             nodal = space.expand(problem.cartesian(state.v), state.t, 1)
         else:
             nodal = space.expand(problem.cartesian(state.u), state.t, 0)
         return _make_function(problem, name, nodal, state.t, continuous)
-    pressure, _ = nodal_contact(problem, state, np.ones(len(state.r_n)))
-    return _make_function(problem, name, add_borrowed(problem, pressure)[:, 0], state.t)
+    return _make_function(problem, name, _compute_contact(problem, state, name), state.t)
+
+
+def _compute_contact(problem: ContactProblem, state: State, name: str) -> Array:
+    """Return a quantity of the contact at the owned nodes, (k,) or (k, d). Collective.
+
+    Args:
+        problem: the problem.
+        state: a state of it.
+        name: that of the quantity.
+    """
+    if name == "contact_pressure":
+        pressure, _ = nodal_contact(problem, state, np.ones(len(state.r_n)))
+        return add_borrowed(problem, pressure)[:, 0]
+    if name == "contact_gap":
+        return compute_gap(problem, state)[:, 0]
+    traction, slip = compute_rubbing(problem, state)
+    if name == "slip":
+        return between(problem, slip)
+    return add_borrowed(problem, between(problem, traction))
 
 
 def add_borrowed(problem: ContactProblem, pressure: Array) -> Array:
-    """Return nodal contact pressures (k, 1) with those of borrowing nodes. Collective.
+    """Return nodal contact pressures or tractions (k, c) with those of borrowers. Collective.
 
     The nodes of contact boundaries that have none of their own take the mean of those of their
     neighbours (``contact.borrowing``).
@@ -125,6 +154,10 @@ def read_function(
         int,
         "give its number, 0 for the first and -1 for the last",
     )
+    if name == "contact_gap":
+        raise InputError(
+            "read_function: frames have no gap; give as_function a state, or record Contact()"
+        )
     kind = "u" if name == "stress" else name
     comm = space.comm
     d = space.dimension
@@ -142,6 +175,8 @@ def read_function(
     if name == "contact_pressure":
         pressure = add_borrowed(problem, values[space.nodes, None])
         return _make_function(problem, name, pressure[:, 0], t)
+    if name == "contact_traction_t":
+        return _make_function(problem, name, add_borrowed(problem, values[space.nodes, :d]), t)
     return _make_function(problem, name, values[space.nodes, :d], t, continuous)
 
 
@@ -281,6 +316,11 @@ def _read_stored(
     try:
         # the index says at which times there are frames, and where each of them is: "file:path"
         index: Any = ET.fromstring(read_bytes(folder / FIELDS_INDEX))
+        attributes = {attribute.get("Name") for attribute in index.iterfind(".//Attribute")}
+        if attributes and name not in attributes:
+            raise InputError(
+                f"the frames in '{folder}' have no '{name}', as those of a run without friction"
+            )
         places = []
         for grid in index.findall(".//Grid[@GridType='Uniform']"):
             time = float(grid.find("Time").get("Value"))

@@ -86,13 +86,7 @@ class NodalWork:
             facets = getattr(load, "facets", None)
             if facets is not None:
                 facets_of("NodalWork", "the facets of loads", facets, space.mesh)
-        self._gravity = np.zeros(space.dimension)
-        if gravity is not None:
-            self._gravity = np.asarray(gravity, dtype=float)
-        if self._gravity.shape != (space.dimension,):
-            raise InputError(
-                f"gravity has {self._gravity.size} components: give {space.dimension} numbers"
-            )
+        self._gravity = self._read_gravity(gravity)
 
         # linear forms with a Function r and an indicator of the group: their products with nodal u,
         # v, a, initial strains and loads are rᵀK u, rᵀC v, rᵀM a, -rᵀf_0 and rᵀf
@@ -124,6 +118,24 @@ class NodalWork:
             if isinstance(load, LinearForm)
         }
         self._tell_constant_loads(owner)
+
+    def _read_gravity(self, gravity: Sequence[float] | None) -> Array:
+        """Return the acceleration (d,) [m/s²], zero where none is given.
+
+        Raises:
+            InputError: another dimension, or a system whose mass nobody said.
+        """
+        dimension = self.space.dimension
+        acceleration = np.zeros(dimension)
+        if gravity is not None:
+            acceleration = np.asarray(gravity, dtype=float)
+        if acceleration.shape != (dimension,):
+            raise InputError(
+                f"gravity has {acceleration.size} components: give {dimension} numbers"
+            )
+        if acceleration.any():
+            self._problem.system.refuse_statics_only("gravity=")
+        return acceleration
 
     def _tell_constant_loads(self, owner: str) -> None:
         """Warn when the system has constant loads and none were given. Collective.

@@ -35,6 +35,9 @@ LEDGER = {
     "energy_defect": "defect",
 }
 
+# Shares with friction, nan while open: column -> their name in the summary.
+SHARES = {"friction_used": "friction_used", "contact_slipping": "slipping"}
+
 # column -> values of some rows: (rows,) float64, or (rows, *shape) of the arrays
 Block = dict[str, Array]
 
@@ -266,7 +269,7 @@ class Tally:
 
     def add(self, rows: Mapping[str, Array]) -> None:
         """Add rows, in order: column -> values."""
-        ends = [name for name in ("t", *LEDGER) if name in rows]
+        ends = [name for name in ("t", *LEDGER, *SHARES) if name in rows]
         self._last = {name: float(rows[name][-1]) for name in ends}
         if not self._first:
             self._first = {name: float(rows[name][0]) for name in ends}
@@ -282,6 +285,9 @@ class Tally:
                 "depth", -rows["contact_min_gap"], np.fmax
             )  # nan without contact points
             self._add_to_sum("contact", np.sign(rows["contact_active"][steps]))
+        for name in SHARES:
+            if name in rows:
+                self._take_largest(name, rows[name], np.fmax)  # nan while open
         if "energy_defect" in rows:
             self._take_largest("energy", rows["energy_kinetic"] + rows["energy_strain"])
             self._take_largest("work", np.abs(rows["work_input"]))
@@ -325,6 +331,10 @@ class Tally:
                 "smallest_gap": -most["depth"],
                 "steps_in_contact": int(self._sums["contact"]),
             }
+        for name, fact in SHARES.items():
+            if name in most:  # of no contact in the whole run there is none: nan
+                ends = {"end": self._last[name], "largest": most[name]}
+                facts[fact] = {key: None if np.isnan(x) else x for key, x in ends.items()}
         if "defect" in most:
             facts |= self._sum_up_energy()
         return facts

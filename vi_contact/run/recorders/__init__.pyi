@@ -1,3 +1,4 @@
+from .body_motion import BodyMotion as BodyMotion
 from .contact import Contact as Contact
 from .energy import Energy as Energy
 from .largest_strain import LargestStrain as LargestStrain

@@ -11,6 +11,7 @@ from ...core.arguments import check_fields
 from ...core.problem import ContactProblem
 from ...core.step import AXES, Columns, Report, Row, State
 from ...core.surfaces import ContactSurface
+from ...fem.output.fields import find_slipping
 from .columns import expand_axes
 
 # Column -> (unit, meaning). One with {axis} in its name is recorded once for each axis.
@@ -31,6 +32,14 @@ _FRICTION_COLUMNS: Columns = {
     "contact_max_slip": (
         "m",
         "largest tangential displacement on the support; nan without contact points",
+    ),
+    "friction_used": (
+        "-",
+        "share of the friction at rest that is used, Σ |r_t| / Σ limit(r_n); nan without a limit",
+    ),
+    "contact_slipping": (
+        "-",
+        "share of the closed points that slipped in the step; nan while open",
     ),
     "traction_t": (
         "Pa",
@@ -68,10 +77,11 @@ class Contact:
     0 the arrays (total,) have all conditions in the order of their numbers, as the points in
     ``history.h5``; on other ranks they are empty.
 
-    With friction it also records the friction force on the body, the largest slip, and arrays
-    (total, d - 1) in the tangents of the nodal frames: traction_t = r_t / weight, the traction of
-    the body on its support, and slip = B_t u, the tangential displacement on the support (of open
-    points too).
+    With friction it also records the friction force on the body and the largest slip, which share
+    of the friction is used, T/(mu N) of Coulomb's law, and which share of the closed points slipped
+    in the step. Arrays (total, d - 1) are in the tangents of the nodal frames: traction_t = r_t /
+    weight, the traction of the body on its support, and slip = B_t u, the tangential displacement
+    on the support (of open points too).
 
     Ranks exchange a dozen numbers in each step. ``arrays=False`` leaves the arrays out, and then
     nothing is gathered.
@@ -120,12 +130,17 @@ class Contact:
 
     def row(self, report: Report) -> Row:
         """Return the row of the step that ``report`` tells of."""
-        return self._row(report.new)
+        slipping = find_slipping(report) if self._frictional else None
+        return self._row(report.new, slipping)
 
-    def _row(self, state: State) -> Row:
+    def _row(self, state: State, slipping: Mask | None = None) -> Row:
         """Return the row of a state. Collective.
 
         Values are listed in the order of the columns.
+
+        Args:
+            state: that of the end of a step, or the first one.
+            slipping: (m,) which points slipped in the step; None where there was no step.
         """
         # What conditions of this rank have: gap, pressure and, with friction, traction and slip.
         surface = self._problem.surface
@@ -144,12 +159,13 @@ class Contact:
             float(np.add.reduce(r_n)),
             *(r_n @ surface.normals).tolist(),
             *(r_n @ surface.points).tolist(),
+            *(self._sum_shares(state, slipping) if self._frictional else ()),
         ]
         if surface.comm.size > 1:
             sums = surface.comm.sum(np.array(sums)).tolist()
         closed, count, resultant, *vectors = sums
         pull = vectors[: len(self._axes)]
-        moment = vectors[len(self._axes) :]
+        moment = vectors[len(self._axes) : 2 * len(self._axes)]
 
         # Largest values: depth = -gap, pressure and slip. Moving obstacles also watch what lies
         # between the points.
@@ -166,7 +182,10 @@ class Contact:
             highest,
         ]
         if self._frictional:
+            used, limit, slid = vectors[2 * len(self._axes) :]
             values += [*self._sum_friction(state), *farthest]
+            values.append(used / limit if limit > 0.0 else np.nan)
+            values.append(slid / count if count else np.nan)
         row: dict[str, Any] = dict(zip(self._numbers, values, strict=True))
         if self.arrays:
             arrays = self._gather(pressure, gap, state.active, *rubbing)
@@ -218,6 +237,18 @@ class Contact:
         if state.r_t is None:
             return np.zeros_like(slip), slip
         return state.r_t / surface.weights[:, None], slip
+
+    def _sum_shares(self, state: State, slipping: Mask | None) -> list[float]:
+        """Return Σ |r_t| [N], Σ limit(r_n) [N] and how many closed points of this rank slipped.
+
+        Args:
+            state: whose reactions count.
+            slipping: (m,) which points slipped, or None.
+        """
+        limit = self._problem.friction.limit(state.r_n, self._problem.surface.weights, 1.0)
+        used = 0.0 if state.r_t is None else float(np.linalg.norm(state.r_t, axis=1).sum())
+        slid = 0 if slipping is None else np.count_nonzero(slipping & state.active)
+        return [used, float(np.sum(limit)), float(slid)]
 
     def _sum_friction(self, state: State) -> list[float]:
         """Return the components [N] of the friction force on the body, -Σ r_t t. Collective."""

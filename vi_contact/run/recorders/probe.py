@@ -1,5 +1,6 @@
 """Record histories at points of the body."""
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -7,22 +8,66 @@ from typing import Annotated, Any
 import numpy as np
 
 from ...core.algebra import Array, Indices
-from ...core.checks import array, column_name, flag, instance
+from ...core.checks import array, column_name, describe_point, flag, instance
 from ...core.errors import InputError
 from ...core.problem import ContactProblem
 from ...core.quantities import Unit
 from ...core.step import AXES, Columns, Report, Row, State
 
+log = logging.getLogger(__name__)
+SAME = 1e-9  # of the size of the body: a point that is nearer to a node is at it
+
+
+@dataclass(frozen=True)
+class Places:
+    """Hold the nodes that make the values at p points, and how much each of them weighs.
+
+    Attributes:
+        nodes: (p, n) numbers of nodes.
+        weights: (p, n) their weights; of each point they add up to one.
+        distances: (p,) how far from its point the value is taken [m].
+    """
+
+    nodes: Indices
+    weights: Array
+    distances: Array
+
+    @classmethod
+    def at_nodes(cls, nodes: Indices, distances: Array | None = None) -> "Places":
+        """Return places at nodes (p,).
+
+        Args:
+            nodes: one for each point.
+            distances: (p,) from the points [m], None where it does not matter.
+        """
+        distances = np.zeros(len(nodes)) if distances is None else distances
+        return cls(np.asarray(nodes)[:, None], np.ones((len(nodes), 1)), distances)
+
+    def interpolate(self, sampled: Array) -> Array:
+        """Return values (p, d) at the points of those at the nodes (p n, d)."""
+        table = sampled.reshape(*self.nodes.shape, -1)
+        if table.shape[1] == 1:
+            return np.asarray(table[:, 0])
+        return np.einsum("pn,pnd->pd", self.weights, table)
+
 
 @dataclass
 class Probe:
-    """Record histories at points of the body, each at its nearest node: label -> point (d,) [m].
+    """Record histories at points of the body: label -> point (d,) [m].
+
+    A point inside a cell has the value of the displacement's own interpolation there, Σ phi_i u_i,
+    and one at a node that of the node. A point outside of the mesh, up to 5 % of the size of the
+    body, and one of a body without cells, has the value of its nearest node. A warning tells the
+    distance.
 
     The columns are u_x_<label>, u_y_<label> [m]; with ``velocity`` also v_x_<label> [m/s], after
     the impact law; with ``acceleration`` also a_x_<label> [m/s²], the *absolute* acceleration. This
     is the one of the step's equation of motion, without velocity jumps of the impact law, plus the
     mean ground acceleration of the step; row 0 has the ground's own. u and v are relative to the
     ground when an excitation shakes the body.
+
+    ``nearest``: take the nearest node of every point; the log and the meaning of the columns tell
+    its distance, as ``distances`` does after ``start``: label -> [m].
 
     InputError if a label has other characters than letters, digits and underscores, or a point is
     outside the body.
@@ -31,10 +76,11 @@ class Probe:
     points: Annotated[Mapping[Any, Sequence[float]], Unit("m")]
     velocity: bool = False
     acceleration: bool = False
+    nearest: bool = False
 
     def __post_init__(self) -> None:
         instance("Probe", "points", self.points, Mapping, "give labels and points, {'top': (x, y)}")
-        for name in ("velocity", "acceleration"):
+        for name in ("velocity", "acceleration", "nearest"):
             flag("Probe", name, getattr(self, name))
         if not self.points:
             raise InputError(
@@ -56,8 +102,12 @@ class Probe:
             quantities["v"] = ("m/s", "velocity after the impact law")
         if self.acceleration:
             quantities["a"] = ("m/s²", "absolute acceleration, mean of the step")
+        distances = getattr(self, "distances", {}) if self.nearest else {}
+        places = {label: f"point {label}" for label in self.points}
+        for label, distance in distances.items():
+            places[label] += f", at the node {distance:.3g} m from it"
         return {
-            f"{letter}_{axis}_{label}": (unit, f"{meaning} along {axis} at point {label}")
+            f"{letter}_{axis}_{label}": (unit, f"{meaning} along {axis} at {places[label]}")
             for letter, (unit, meaning) in quantities.items()
             for label, point in self.points.items()
             for axis in AXES[: len(point)]
@@ -66,7 +116,7 @@ class Probe:
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
     ) -> Row:
-        """Find the nodes; return the row of the first state. Collective.
+        """Find the nodes and their weights; return the row of the first state. Collective.
 
         Args:
             problem: what is marched.
@@ -81,14 +131,63 @@ class Probe:
         points = np.array(list(self.points.values()), dtype=float)
         if points.shape[1] != dimension:
             raise InputError(f"a probe point has {points.shape[1]} coordinates: give {dimension}")
-        self._nodes = self._find_nodes(problem, points)
+        self._places = self._find_places(problem, points)
+        distances = self._places.distances.tolist()
+        self.distances = dict(zip(self.points, distances, strict=True))
+        self._tell_distances(problem)
         return self._row(
             state, lambda: np.tile(problem.ground_acceleration(state.t), (len(points), 1))
         )
 
-    def _find_nodes(self, problem: ContactProblem, points: Array) -> Indices:
-        """Return the nodes (p,) nearest to points (p, d) [m]."""
-        return problem.system.space.find_nodes(points)
+    def _find_places(self, problem: ContactProblem, points: Array) -> Places:
+        """Return the nodes that make the values at points (p, d) [m], and their weights.
+
+        Collective.
+        """
+        space: Any = problem.system.space
+        if not hasattr(space, "find_nearest"):  # of a user's own: where its nodes are is not known
+            return Places.at_nodes(space.find_nodes(points))
+        in_cells = hasattr(space, "find_in_cells") and not self.nearest
+        nodes, distances = space.find_nearest(points, anywhere=in_cells)
+        distances[distances <= SAME * space.size] = 0.0
+        away = np.flatnonzero(distances)
+        if not in_cells or not len(away):
+            return Places.at_nodes(nodes, distances)
+
+        # Points that are at no node are in a cell, or so near to the body that a node is meant:
+        # ``find_nodes`` refuses others.
+        cells = space.find_in_cells(points[away])
+        for k, cell in zip(away, cells, strict=True):
+            if cell is None:
+                space.find_nodes(points[k][None])
+
+        # Rows of equal length: those of points at a node are filled up with weights of zero.
+        width = max((len(cell[0]) for cell in cells if cell is not None), default=1)
+        table = np.repeat(nodes[:, None], width, axis=1)
+        weights = np.zeros(table.shape)
+        weights[:, 0] = 1.0
+        for k, cell in zip(away, cells, strict=True):
+            if cell is not None:
+                table[k], weights[k] = cell
+                distances[k] = 0.0
+        return Places(table, weights, distances)
+
+    def _tell_distances(self, problem: ContactProblem) -> None:
+        """Say on rank 0 how far the nodes are that points take their values from."""
+        if problem.surface.comm.rank:
+            return
+        level = logging.INFO if self.nearest else logging.WARNING
+        why = "" if self.nearest else ", as it is in no cell"
+        for label, distance in self.distances.items():
+            if distance:
+                log.log(
+                    level,
+                    "probe '%s' at %s takes the node that is %.3g m from it%s",
+                    label,
+                    describe_point(np.asarray(self.points[label], dtype=float)),
+                    distance,
+                    why,
+                )
 
     def row(self, report: Report) -> Row:
         """Return the row of the step that ``report`` tells of."""
@@ -113,13 +212,14 @@ class Probe:
         return dict(zip(self.columns(), np.concatenate(values, axis=None).tolist(), strict=True))
 
     def _sample(self, x: Array, t: float, derivative: int) -> Array:
-        """Return values (p, d) at the nodes.
+        """Return values (p, d) at the points.
 
         Args:
             x: displacements, velocities or accelerations (n,) in the basis of the nodal frames.
             t: the time [s], at which prescribed components are known.
             derivative: 0, 1 or 2, which of them x is.
         """
-        return self._problem.system.space.sample(
-            self._problem.cartesian(x), self._nodes, t, derivative
+        sampled = self._problem.system.space.sample(
+            self._problem.cartesian(x), self._places.nodes.ravel(), t, derivative
         )
+        return self._places.interpolate(sampled)

@@ -14,47 +14,13 @@ from ....core.algebra import Array
 from ....core.quantities import RATIO, Between, Positive
 from ....core.units import STANDARD_GRAVITY
 from .comparison import Check, Formula, Gravity, History, Incline, Length, Numbers
+from .rigid_slip import slide
 
-# CHOSEN: number of parts of a step of the run. A slide ends within one of them, which costs less
-# than r h²/8 of slip, h = dt/32.
-PARTS = 32
 # CHOSEN: share of alpha below which the first tilt is round-off of a block that stands.
 ROUNDED = 1e-9
 # CHOSEN: longest step of the rigid block, over 1/p. Its angles are those of shorter steps to 0.1 %.
 FINE = 2e-4
 MOST_PARTS = 400  # of a step of the run, for a block of any size
-
-
-def slide(t: Array, drive: Array, resist: Array, *, one_sided: bool = False) -> Array:
-    """Return the displacement [m] at times t (n,) of u'' = w - r sgn(u') from rest.
-
-    It sticks while |w| <= r.
-
-    Args:
-        t: (n,), rising [s].
-        drive: w (n,), linear between the times [m/s²].
-        resist: r >= 0 (n,), linear between the times [m/s²].
-        one_sided: whether it never slides back, u' >= 0.
-    """
-    u = np.zeros(len(t))
-    slip = 0.0
-    speed = 0.0
-    share = (np.arange(PARTS) + 0.5) / PARTS
-    for row, length in enumerate(np.diff(t) / PARTS):
-        # Changes of speed in every part of the step: by the drive, and at most by the resistance.
-        gains = length * (drive[row] + share * (drive[row + 1] - drive[row]))
-        losses = length * (resist[row] + share * (resist[row + 1] - resist[row]))
-
-        # Implicit Euler for the speed: what resistance cannot take away is left. The slip follows
-        # by the trapezoidal rule.
-        for gain, loss in zip(gains.tolist(), losses.tolist(), strict=True):
-            free = speed + gain
-            backward = 0.0 if one_sided else max(-free - loss, 0.0)
-            new_speed = max(free - loss, 0.0) - backward
-            slip = slip + 0.5 * length * (speed + new_speed)
-            speed = new_speed
-        u[row + 1] = slip
-    return u
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,0 +1,267 @@
+"""Write docs/reference/validation.md from the entries of the validation book and stored results.
+
+    python3 docs/make_validation.py            # write the page: after every change of an entry
+    python3 docs/make_validation.py --check    # say whether it is up to date
+    python3 docs/make_validation.py --run      # compute all entries first: results and pictures too
+    python3 docs/make_validation.py --run wedge dam    # these only, beside what is stored
+
+The records of some entries must stand where VI_CONTACT_RECORDS says.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from vi_contact.validation import Entry, entry_names, read_entry, run_entry
+from vi_contact.validation.data import NEEDED
+from vi_contact.validation.entry import KINDS, RECORDS, SETTINGS
+from vi_contact.validation.report import draw_outcome, input_rows
+from vi_contact.validation.results import RESULTS, read_results, rows_of, write_rows
+from vi_contact.validation.runner import FAIL, compare_groups
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = ROOT / "docs" / "reference" / "validation.md"
+FIGURES = ROOT / "docs" / "figures"
+Rows = Sequence[Any]
+
+HEAD = f"""# Validation book
+
+This page is for readers who ask how far results of vi_contact agree with measurements, with
+numbers of other programs and with textbooks. [Verification](verification.md) has what must agree
+to round-off or to the order of a method. Here every limit has a reason of one sentence, and every
+entry says what its result is not.
+
+The page is written by `docs/make_validation.py` from the files in `vi_contact/validation`. Each
+entry is a folder there: `data.csv` has the numbers of the source with licence and uncertainty,
+`entry.toml` the inputs, limits and reasons, and `run.py` the computation. Nobody needs this page
+to repeat it:
+
+    vi-contact validate                  # all entries at the coarse setting, in a few minutes
+    vi-contact validate wedge --fine     # one of them with finer meshes and shorter steps
+    vi-contact validate --mutants        # wrong inputs too, each of which must be noticed
+    vi-contact validate --out report     # report.csv, report.pdf and pictures
+
+The command ends with a status other than 0 when a figure is missing, NaN or outside of its limit,
+when data were changed, and when a run ends in an error. Some entries need records that are not
+part of the package. They are skipped, and this is printed, unless the environment variable
+`{RECORDS}` names the folder of the records. Those of SLAMMER are in the public domain, and in
+the folder `src/pyslammer/sample_ground_motions` of
+[pySLAMMER](https://github.com/pySLAMMER/pySLAMMER) (commit dd8cfad3); `entry.toml` has the
+checksum of each.
+
+A changed value of `data.csv` is noticed in two ways. The file has a checksum in `entry.toml`, so
+that any change fails. A value that is changed by two limits also fails by its figure. In a series
+of many values, which is judged by statistics, a single value is noticed by the checksum alone.
+
+There are two numbers for each figure: the limit says what is right, and the stored results in
+`vi_contact/validation/stored` say what was found before. The command tells a figure that has
+moved by more than a third of its limit since then, and a test fails.
+
+A figure is *told* when it is of interest and nothing says what is right. The certificate is the
+worst of all steps and static stages, and the energy defect that of all runs in time
+([glossary](glossary.md)). Seconds are those of one core of a small machine.
+"""
+
+FOOT = """## Not in the book yet
+
+- **Graphite bricks** (81 of them on a shaking table, measured): many bodies with gaps between
+  them, each with clearances that are part of the data.
+- **Stick-slip of a fault of 4 m** (FB03-087, measured): it needs friction that weakens with slip,
+  and mu may not depend on slip here.
+- **SSNP142 of code_aster** (a joint of a dam): its joint is a penalty, and its geometry is not
+  at hand.
+- **Example 8.8 of Kramer and Stewart**, and the periods of Pine Flat dam with its reservoir: the
+  second needs the added mass of water.
+- **Statistics of rocking blocks, and pounding of buildings**: their tables are not public, and
+  have to be fetched by hand.
+"""
+
+
+def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Yield the lines of a table."""
+    yield "| " + " | ".join(header) + " |"
+    yield "|" + "---|" * len(header)
+    for row in rows:
+        yield "| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |"
+    yield ""
+
+
+def digits(value: float) -> str:
+    """Return a number with six digits, a dash for none."""
+    return "-" if math.isnan(value) else f"{value:.6g}"
+
+
+def overview(entries: Sequence[Entry], stored: dict[str, Rows]) -> Iterator[str]:
+    """Yield the table of all entries."""
+    yield "## Entries\n"
+    rows = []
+    for entry in entries:
+        cells = [f"[{entry.name}](#{entry.name.replace('_', '-')})", KINDS[entry.kind], entry.title]
+        for setting in ("coarse", "fine"):
+            own = [row for row in stored[setting] if row["entry"] == entry.name]
+            judged = [row for row in own if row["verdict"] in ("pass", "fail")]
+            within = sum(row["verdict"] == "pass" for row in judged)
+            seconds = own[0]["seconds"] if own else math.nan
+            cells += [f"{within} of {len(judged)}", f"{seconds:.0f}"]
+        rows.append(cells)
+    header = ("entry", "numbers are", "title", "within, coarse", "s", "within, fine", "s")
+    yield from table(header, rows)
+
+
+def section(entry: Entry, stored: dict[str, Rows]) -> Iterator[str]:
+    """Yield the lines about an entry."""
+    own = {
+        setting: [row for row in rows if row["entry"] == entry.name]
+        for setting, rows in stored.items()
+    }
+    yield f"## {entry.name.replace('_', ' ')}\n"
+    yield f"**{entry.title}.** {entry.about}\n"
+    yield f"The numbers are {KINDS[entry.kind]}.\n"
+    about = [(key, entry.data.about[key]) for key in NEEDED]
+    yield from table(("data.csv", ""), about)
+    yield "How it is computed:\n"
+    yield from (f"- {sentence}" for sentence in entry.model)
+    yield "\nWhat the result is not:\n"
+    yield from (f"- {sentence}" for sentence in entry.is_not)
+    yield ""
+    if (FIGURES / f"validation_{entry.name}.png").is_file():
+        yield f"![{entry.title}](../figures/validation_{entry.name}.png)\n"
+    yield from cost(own)
+    yield from judged_figures(own)
+    yield from reasons(own)
+    yield from series(entry, own)
+    yield from table(("input", "value", "unit", "kind", "source"), input_rows(entry))
+    names = ", ".join(mutant.name for mutant in entry.mutants)
+    yield f"Wrong inputs that must be noticed, and are, in `tests/validation_book`: {names}.\n"
+
+
+def cost(own: dict[str, Rows]) -> Iterator[str]:
+    """Yield the table of seconds, unknowns, certificate and energy defect."""
+    rows = []
+    for setting in ("coarse", "fine"):
+        for row in own[setting][:1]:
+            defect = row["energy_defect"]
+            rows.append(
+                (
+                    setting,
+                    f"{row['seconds']:.1f}",
+                    str(row["unknowns"]),
+                    f"{row['certificate']:.1e}" if row["certificate"] > 0.0 else "-",
+                    f"{defect:.1e}" if defect == defect else "-",
+                )
+            )
+    yield from table(("setting", "seconds", "unknowns", "certificate", "energy defect"), rows)
+
+
+def judged_figures(own: dict[str, Rows]) -> Iterator[str]:
+    """Yield the table of figures that are judged by themselves or told."""
+    coarse = {row["figure"]: row for row in own["coarse"]}
+    fine = {row["figure"]: row for row in own["fine"]}
+    rows = []
+    for name, row in (fine | coarse).items():
+        if row["verdict"] in ("within", "outside"):
+            continue
+        cells = [name, row["unit"]]
+        for of_setting in (coarse, fine):
+            cells.append(digits(of_setting[name]["found"]) if name in of_setting else "-")
+        cells += [digits(row["wanted"]), f"{row['error']:.2g}", f"{row['limit']:.2g}"]
+        verdicts = {one[name]["verdict"] for one in (coarse, fine) if name in one}
+        cells.append("fail" if "fail" in verdicts else row["verdict"])
+        rows.append([cell.replace("nan", "-") for cell in cells])
+    header = ("figure", "unit", "coarse", "fine", "wanted", "error", "limit", "verdict")
+    yield from table(header, rows)
+
+
+def reasons(own: dict[str, Rows]) -> Iterator[str]:
+    """Yield the reasons of the limits, each with its figures."""
+    names: dict[str, list[str]] = {}
+    for row in [*own["coarse"], *own["fine"]]:
+        if row["figure"] not in names.setdefault(row["reason"], []):
+            names[row["reason"]].append(row["figure"])
+    rows = []
+    for reason, group in names.items():
+        rows.append(
+            (group[0] if len(group) == 1 else f"{group[0]} and {len(group) - 1} more", reason)
+        )
+    yield from table(("figure", "why this limit"), rows)
+
+
+def series(entry: Entry, own: dict[str, Rows]) -> Iterator[str]:
+    """Yield a sentence about each series, and each other group of many values."""
+    for setting in ("coarse", "fine"):
+        rows = {row["figure"]: row for row in own[setting]}
+        figures = {name: row["found"] for name, row in rows.items()}
+        wanted = entry.list_wanted(setting) if rows else []
+        for group, one in compare_groups(wanted, figures).items():
+            unit = next(each.unit for each in wanted if each.group == group)
+            yield (
+                f"At the setting {setting} {one.count} values of *{group}* have the slope "
+                f"{one.slope:.5f}, the intercept {one.intercept:.3g} {unit} and R² = {one.r2:.6f}. "
+                f"Of them {100 * one.share:.1f} % are within their limits; the median of the "
+                f"relative error is {100 * one.median:.2f} %. The largest difference is "
+                f"{one.largest:.3g} {unit}, at {one.where}.\n"
+            )
+        outside = [name for name, row in rows.items() if row["verdict"] == "outside"]
+        if outside:
+            yield "Outside of their limits are:\n"
+            yield from (f"- {name}" for name in outside)
+            yield ""
+
+
+def written(names: Sequence[str]) -> str:
+    """Return the page about these entries."""
+    entries = [read_entry(name) for name in names]
+    stored = {setting: read_results(setting) for setting in ("coarse", "fine")}
+    lines = [HEAD, *overview(entries, stored)]
+    for entry in entries:
+        lines += section(entry, stored)
+    return "\n".join([*lines, FOOT])
+
+
+def run_all(names: Sequence[str]) -> int:
+    """Compute entries at all settings, store their results and pictures; return how many failed."""
+    failed = 0
+    for setting in SETTINGS:
+        stored = {name: [] for name in entry_names()} | {
+            name: [row for row in read_results(setting) if row["entry"] == name]
+            for name in entry_names()
+        }
+        for name in names:
+            outcome = run_entry(name, setting=setting)
+            print(f"{setting} {name}: {outcome.status}, {outcome.seconds:.1f} s", flush=True)
+            print("".join(f"  {why}\n" for why in outcome.why), end="", flush=True)
+            failed += outcome.status == FAIL
+            if outcome.found is None:
+                continue
+            stored[name] = rows_of(outcome)
+            if setting == "coarse":
+                draw_outcome(outcome, FIGURES / f"validation_{name}.png")
+        RESULTS.mkdir(exist_ok=True)
+        write_rows(RESULTS / f"{setting}.csv", [row for rows in stored.values() for row in rows])
+    return failed
+
+
+def main() -> int:
+    """Write the page, after computing entries with --run; with --check say if it is up to date."""
+    arguments = sys.argv[1:]
+    names = [name for name in arguments if not name.startswith("--")]
+    failed = run_all(names or entry_names()) if "--run" in arguments else 0
+    page = written(entry_names())
+    if "--check" in arguments:
+        if PAGE.read_text(encoding="utf-8") != page:
+            print(
+                f"{PAGE.name} is not that of the stored results: python3 docs/make_validation.py",
+                file=sys.stderr,
+            )
+            return 1
+        return 0
+    PAGE.write_text(page, encoding="utf-8")
+    return int(failed > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""Hold the entries of the validation book, a folder for each."""

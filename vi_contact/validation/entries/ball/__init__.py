@@ -1,0 +1,1 @@
+"""A ball that strikes thick glass at an angle."""

@@ -1,0 +1,1 @@
+"""Slide rigid blocks by records: 90 numbers of SLAMMER."""

@@ -1,0 +1,1 @@
+"""Slide blocks of finite elements down a slope: numbers of SLAMMER."""

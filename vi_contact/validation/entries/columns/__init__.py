@@ -1,0 +1,1 @@
+"""Slide elastic columns under a record: numbers of SLAMMER."""

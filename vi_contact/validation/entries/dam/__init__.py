@@ -1,0 +1,1 @@
+"""Weigh a gravity dam under water and uplift: a textbook example."""

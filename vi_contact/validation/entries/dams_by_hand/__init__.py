@@ -1,0 +1,1 @@
+"""Weigh two more gravity dams, whose calculation by hand stands beside them."""

@@ -1,0 +1,1 @@
+"""Push a wedge up a slope: NAFEMS CGS-4."""
