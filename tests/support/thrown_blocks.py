@@ -12,8 +12,7 @@ from two_bodies import SOFT, relative, thrown, two_blocks
 import vi_contact as vc
 from vi_contact import fem
 from vi_contact.core.algebra import Array
-from vi_contact.core.step import Report
-from vi_contact.fem.output.fields import find_slipping
+from vi_contact.core.step import Report, find_slipping
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
 

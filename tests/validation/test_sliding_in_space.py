@@ -21,8 +21,7 @@ from two_bodies import per_body, relative
 import vi_contact as vc
 from vi_contact import fem
 from vi_contact.core.algebra import Array
-from vi_contact.core.step import State
-from vi_contact.fem.output.fields import find_slipping
+from vi_contact.core.step import State, find_slipping
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import Blocks
 

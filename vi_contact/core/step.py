@@ -460,6 +460,13 @@ class Report:
         return self.averages()
 
 
+def find_slipping(report: Report) -> Mask:
+    """Return which conditions (m,) moved along their support in a step with friction."""
+    step = report.step
+    slip = step.surface.tangential_values(report.result.x)
+    return np.asarray(np.any(slip != step.slip0, axis=1))
+
+
 class Recorder(Protocol):
     """Listen to the loop: name columns once, and fill a row after every step.
 

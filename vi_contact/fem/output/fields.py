@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import numpy as np
 
-from ...core.algebra import Array, Indices, Mask, from_each, on_first
+from ...core.algebra import Array, Indices, from_each, on_first
 from ...core.arguments import check_fields
 from ...core.checks import column_name
 from ...core.errors import InputError
@@ -36,7 +36,7 @@ from ...core.files import (
 from ...core.own_files import inner_folder, make_inner_folder, remove
 from ...core.problem import ContactProblem
 from ...core.quantities import Positive
-from ...core.step import Report, State
+from ...core.step import Report, State, find_slipping
 from ..matrices.own_matrices import MatrixSpace
 from ..mesh.nodal_space import NodalSpace
 
@@ -493,13 +493,6 @@ def between(problem: ContactProblem, nodal: Array, mean: Any = np.mean) -> Array
         own += [bubbles.nodes.numbers for bubbles in conditions.bubbles]
     middles = np.concatenate(from_each(space.comm, np.concatenate(own)))
     return space.hierarchy.between(nodal, np.isin(space.nodes, middles), mean)
-
-
-def find_slipping(report: Report) -> Mask:
-    """Return which conditions (m,) moved along their support in a step with friction."""
-    step = report.step
-    result = report.result
-    return np.asarray(np.any(step.surface.tangential_values(result.x) != step.slip0, axis=1))
 
 
 def _describe_data(shape: tuple[int, ...], where: str, number: str = "Float", size: int = 8) -> str:

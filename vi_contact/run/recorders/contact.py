@@ -9,9 +9,8 @@ import numpy as np
 from ...core.algebra import Array, Mask, total
 from ...core.arguments import check_fields
 from ...core.problem import ContactProblem
-from ...core.step import AXES, Columns, Report, Row, State
+from ...core.step import AXES, Columns, Report, Row, State, find_slipping
 from ...core.surfaces import ContactSurface
-from ...fem.output.fields import find_slipping
 from .columns import expand_axes
 
 # Column -> (unit, meaning). One with {axis} in its name is recorded once for each axis.
