@@ -1,0 +1,238 @@
+"""Write docs/reference/promises.md: numbers that the pages promise, and the tests that show them.
+
+    python3 docs/make_promises.py            # write the page: after every change of a sentence
+    python3 docs/make_promises.py --check    # say whether it is up to date
+
+A promise is a sentence that states by a number how well something holds: a closure, an agreement,
+an order. A test shows it when it bears ``@pytest.mark.promise("guide/soil.md", "a piece of the
+sentence")``. The piece may stand in one sentence of the page only.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
+PAGE = DOCS / "reference" / "promises.md"
+SOURCES = (
+    ROOT / "README.md",
+    *(path for room in ("start", "guide", "theory") for path in sorted((DOCS / room).glob("*.md"))),
+)
+
+HEAD = """# Promises
+
+This page is for readers who ask which numbers of these pages a test shows. It lists the sentences
+of the README and of the pages on first runs, guide and theory that state by a number how well
+something holds. Such a number is a closure, an agreement, a bound of an error or an order. Inputs,
+times, costs and rows of tables with results alone are not listed.
+
+A test shows a sentence when it bears the marker `promise` with a piece of it, and when its bound
+is at least as strict as the sentence. It shows one case of a sentence that speaks of several.
+Sentences without such a test stand at the end. They were measured when they were written, and
+nothing notices when they become wrong.
+
+The page is written by `docs/make_promises.py` from the pages and the tests.
+"""
+
+# What no reader sees as a sentence: front matter, listings, equations, comments, pictures.
+_UNREAD = re.compile(
+    r"\A---\n.*?\n---\n|^ *(```|~~~).*?^ *\1$|\$\$.*?\$\$|<!--.*?-->|!\[[^\]]*\]\([^)]*\)",
+    re.MULTILINE | re.DOTALL,
+)
+_ITEM = re.compile(r" *(?:[-*]|\d+\.) ")
+_ENDS = re.compile(r"(?<=[.!?])[\"*)\]]*\s+(?=[\"*(\[]*[A-ZÀ-Þ\d`$])")
+
+_SMALL = r"(?:\d+(?:\.\d+)?(?:e-|·10⁻)\d*|\$?(?:\d+ \\cdot )?10\^\{-\d+\}|10⁻)"
+_SHARE = r"\d+(?:\.\d+)?(?: \\?%|%)"
+_EXACT = r"(?:round-?(?:off|ing)|the (?:last|same) (?:bits?|digits?))"
+_FEW = r"(?:at most|up to|about|less than|better than|some)"
+_JUDGES = (
+    r"(?:agree\w*|differ\w*|right|reproduce\w*|errors?|miss\w*|holds?|close[sd]?|equals?|same|"
+    r"finds?|found|keeps?|as .{0,40} says?|accurate|exact|bounded|off|shows?|is(?= to)|is that)"
+)
+# How a sentence states that something holds, by a number.
+_PROMISE = re.compile(
+    # to 1e-12, below 1e-9, by at most 3e-7: such small numbers are bounds
+    rf"\b(?:to|within|below|by|than|is|are|most|under) (?:{_FEW} )?{_SMALL}"
+    # right to 2 %, differ by 0.5 %: a share is a bound beside a word that compares
+    rf"|\b{_JUDGES}\b[^.;]{{0,120}}?\b(?:to|within|by|below|most|than|is) (?:{_FEW} )?{_SHARE}"
+    rf"|\b(?:within|to) (?:{_FEW} )?{_SHARE}[^.;]{{0,60}}\b{_JUDGES}\b"
+    # to round-off, to the last bit, all digits
+    rf"|\b(?:to|but|at|than|as|is|are) (?:the )?{_EXACT}"
+    r"|\b(?:[Dd]igit by digit|digit for digit|[Bb]it (?:by|for) bit)\b"
+    r"|\b(?:[Aa]ll|[Ee]very|\w+)(?: printed)? digits?\b[^.;]* (?:reproduced|tested)"
+    r"|\bto (?:all|the last|three|four|five|six|seven|eight|nine|ten) digits?\b"
+    # falls with order 2, of order 2, keeps its order
+    r"|\b(?:with|of|is|has|keeps) (?:about |its )?(?:the )?orders? (?:up to )?\d"
+    r"|\berrors?\b[^.;]* of (?:first|second) order|\b[Oo]bserved order\b"
+)
+# Numbers that are none: settings, thresholds of refusals, what others do, what rounding does.
+_ASIDE = re.compile(
+    r"\brefuse[sd]?\b|\bfirst corrected\b|[Bb]utterworth|rounding unit|\bcounts? as\b|eigenvalue"
+    r"|not reproduced|not at round-off|iterations? to|unit of u|[Pp]rograms differ|rings \("
+    r"|depends? on|adds? up|that damps|between alpha and b/h|Anderson|factorise nothing"
+    r"|oscillates|may miss|is rounded to|adds? up|which is 1e-9|off symmetry|off by"
+)
+
+
+@dataclass
+class Promise:
+    """Hold a sentence of a page, and the tests that show it, as file and name."""
+
+    page: str
+    text: str
+    tests: list[tuple[str, str]] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Marker:
+    """Hold what a test says that it shows: a piece of a sentence of a page."""
+
+    page: str
+    piece: str
+    file: str
+    test: str
+
+
+def name_page(path: Path) -> str:
+    """Return the name of a page as markers give it: README.md, guide/soil.md."""
+    return path.relative_to(DOCS if DOCS in path.parents else ROOT).as_posix()
+
+
+def read_blocks(text: str) -> Iterator[str]:
+    """Yield paragraphs, items of lists and rows of tables, each on one line."""
+    held: list[str] = []
+    listing = False
+    for line in [*_UNREAD.sub("\n", text).splitlines(), ""]:
+        item = _ITEM.match(line)
+        listing = line.startswith(" " * 4) and not item and (listing or not held)
+        if listing or item or not line.strip() or line[0] in "|#":
+            if held:
+                yield " ".join(" ".join(held).split())
+            held = []
+        if line.strip() and not listing and line[0] != "#":
+            held.append(line)
+
+
+def read_sentences(text: str) -> Iterator[str]:
+    """Yield the sentences of a page; a row of a table counts as one."""
+    for block in read_blocks(text):
+        if block[0] == "|":
+            yield block
+        else:
+            yield from _ENDS.split(re.sub(rf"\A{_ITEM.pattern}", "", block))
+
+
+def is_promise(sentence: str) -> bool:
+    """Return whether a sentence states by a number how well something holds."""
+    return bool(_PROMISE.search(sentence)) and not _ASIDE.search(sentence)
+
+
+def read_markers() -> Iterator[Marker]:
+    """Yield the markers of all tests, in the order of files; no test is imported."""
+    for path in sorted([*(ROOT / "tests").rglob("test_*.py"), *DOCS.rglob("test_*.py")]):
+        source = path.read_text(encoding="utf-8")
+        if "mark.promise(" not in source:
+            continue
+        for test in ast.walk(ast.parse(source)):
+            if not isinstance(test, ast.FunctionDef):
+                continue
+            for mark in test.decorator_list:
+                if isinstance(mark, ast.Call) and ast.unparse(mark.func).endswith("mark.promise"):
+                    page, piece = (ast.literal_eval(argument) for argument in mark.args)
+                    yield Marker(page, piece, path.relative_to(ROOT).as_posix(), test.name)
+
+
+def gather() -> tuple[list[Promise], list[Marker]]:
+    """Return the promises of all pages with their tests, and the markers that fit none.
+
+    A sentence that a marker names is a promise, whether or not it looks like one. A marker fits
+    none when its piece stands in no sentence of its page, or in several.
+    """
+    sentences = [
+        Promise(name_page(path), sentence)
+        for path in SOURCES
+        for sentence in read_sentences(path.read_text(encoding="utf-8"))
+    ]
+    lost = []
+    for marker in read_markers():
+        fitting = [
+            sentence
+            for sentence in sentences
+            if sentence.page == marker.page and marker.piece in sentence.text
+        ]
+        if len(fitting) == 1:
+            fitting[0].tests.append((marker.file, marker.test))
+        else:
+            lost.append(marker)
+    promises = [one for one in sentences if one.tests or is_promise(one.text)]
+    return promises, lost
+
+
+def write_cell(text: str) -> str:
+    """Return a sentence as a cell of a table: no links, which would lead elsewhere from here."""
+    text = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", text)
+    if "$" not in text:
+        text = re.sub(r"(?<!\w)\*+(?=\w)|(?<=[\w.!?])\*+(?!\w)", "", text)  # no half of an emphasis
+    return re.sub(r"\s*\|\s*", "; ", text.strip(" |"))
+
+
+def write_rows(promises: list[Promise], tested: bool) -> Iterator[str]:
+    """Yield a section for each page that has such promises."""
+    for page in dict.fromkeys(one.page for one in promises if bool(one.tests) == tested):
+        target = "../../README.md" if page == "README.md" else f"../{page}"
+        yield f"**[{page}]({target})**\n"
+        yield "| promise | shown by |" if tested else "| promise |"
+        yield "|---|---|" if tested else "|---|"
+        for one in promises:
+            if one.page != page or bool(one.tests) != tested:
+                continue
+            links = [f"[{name}](../../{file})" for file, name in one.tests]
+            cells = [write_cell(one.text), ", ".join(links)]
+            yield "| " + " | ".join(cells if tested else cells[:1]) + " |"
+        yield ""
+
+
+def write_page(promises: list[Promise]) -> str:
+    """Return the page."""
+    count = len(promises)
+    shown = sum(bool(one.tests) for one in promises)
+    lines = [
+        HEAD,
+        f"Of {count} promises {shown} have a test, and {count - shown} have none.\n",
+        "## Shown by tests\n",
+        *write_rows(promises, tested=True),
+        "## Without a test\n",
+        *write_rows(promises, tested=False),
+    ]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def main() -> int:
+    """Write the page, or with --check say whether it is up to date."""
+    promises, lost = gather()
+    for marker in lost:
+        print(
+            f"{marker.file}, {marker.test}: not one sentence of {marker.page} has {marker.piece!r}",
+            file=sys.stderr,
+        )
+    page = write_page(promises)
+    if "--check" not in sys.argv[1:]:
+        PAGE.write_text(page, encoding="utf-8")
+    elif not PAGE.is_file() or PAGE.read_text(encoding="utf-8") != page:
+        print(
+            f"{PAGE.name} is not that of pages and tests: python3 docs/make_promises.py",
+            file=sys.stderr,
+        )
+        return 1
+    return int(bool(lost))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
