@@ -5,7 +5,8 @@
 
 A promise is a sentence that states by a number how well something holds: a closure, an agreement,
 an order. A test shows it when it bears ``@pytest.mark.promise("guide/soil.md", "a piece of the
-sentence")``. The piece may stand in one sentence of the page only.
+sentence")``. The piece may stand in one sentence of the page only. A test whose bound is wider than
+the number of the sentence says so: ``bound="1e-10"``.
 """
 
 from __future__ import annotations
@@ -33,9 +34,11 @@ something holds. Such a number is a closure, an agreement, a bound of an error o
 times, costs and rows of tables with results alone are not listed.
 
 A test shows a sentence when it bears the marker `promise` with a piece of it, and when its bound
-is at least as strict as the sentence. It shows one case of a sentence that speaks of several.
-Sentences without such a test stand at the end. They were measured when they were written, and
-nothing notices when they become wrong.
+is at least as strict as the sentence. It may show one case of a sentence that speaks of several.
+Other tests have a wider bound, often because a measured number differs between processors. They
+notice large faults, and the number of the sentence is what was measured. Sentences without any
+test stand at the end. They were measured when they were written, and nothing notices when they
+become wrong.
 
 The page is written by `docs/make_promises.py` from the pages and the tests.
 """
@@ -81,15 +84,6 @@ _ASIDE = re.compile(
 )
 
 
-@dataclass
-class Promise:
-    """Hold a sentence of a page, and the tests that show it, as file and name."""
-
-    page: str
-    text: str
-    tests: list[tuple[str, str]] = field(default_factory=list)
-
-
 @dataclass(frozen=True)
 class Marker:
     """Hold what a test says that it shows: a piece of a sentence of a page."""
@@ -98,6 +92,23 @@ class Marker:
     piece: str
     file: str
     test: str
+    bound: str  # of the test, if it is wider than the number of the sentence
+
+
+@dataclass
+class Promise:
+    """Hold a sentence of a page, and the markers of tests that show it."""
+
+    page: str
+    text: str
+    markers: list[Marker] = field(default_factory=list)
+
+    @property
+    def kind(self) -> str:
+        """Return how it is shown: by a test, by one with a wider bound, or not."""
+        if any(not marker.bound for marker in self.markers):
+            return "shown"
+        return "wider" if self.markers else "none"
 
 
 def name_page(path: Path) -> str:
@@ -146,7 +157,9 @@ def read_markers() -> Iterator[Marker]:
             for mark in test.decorator_list:
                 if isinstance(mark, ast.Call) and ast.unparse(mark.func).endswith("mark.promise"):
                     page, piece = (ast.literal_eval(argument) for argument in mark.args)
-                    yield Marker(page, piece, path.relative_to(ROOT).as_posix(), test.name)
+                    bounds = [ast.literal_eval(keyword.value) for keyword in mark.keywords]
+                    file = path.relative_to(ROOT).as_posix()
+                    yield Marker(page, piece, file, test.name, "".join(bounds))
 
 
 def gather() -> tuple[list[Promise], list[Marker]]:
@@ -168,10 +181,10 @@ def gather() -> tuple[list[Promise], list[Marker]]:
             if sentence.page == marker.page and marker.piece in sentence.text
         ]
         if len(fitting) == 1:
-            fitting[0].tests.append((marker.file, marker.test))
+            fitting[0].markers.append(marker)
         else:
             lost.append(marker)
-    promises = [one for one in sentences if one.tests or is_promise(one.text)]
+    promises = [one for one in sentences if one.markers or is_promise(one.text)]
     return promises, lost
 
 
@@ -183,33 +196,41 @@ def write_cell(text: str) -> str:
     return re.sub(r"\s*\|\s*", "; ", text.strip(" |"))
 
 
-def write_rows(promises: list[Promise], tested: bool) -> Iterator[str]:
-    """Yield a section for each page that has such promises."""
-    for page in dict.fromkeys(one.page for one in promises if bool(one.tests) == tested):
+def write_rows(promises: list[Promise], kind: str) -> Iterator[str]:
+    """Yield a table for each page that has promises of a kind."""
+    for page in dict.fromkeys(one.page for one in promises if one.kind == kind):
         target = "../../README.md" if page == "README.md" else f"../{page}"
         yield f"**[{page}]({target})**\n"
-        yield "| promise | shown by |" if tested else "| promise |"
-        yield "|---|---|" if tested else "|---|"
+        yield "| promise |" if kind == "none" else "| promise | test |"
+        yield "|---|" if kind == "none" else "|---|---|"
         for one in promises:
-            if one.page != page or bool(one.tests) != tested:
-                continue
-            links = [f"[{name}](../../{file})" for file, name in one.tests]
-            cells = [write_cell(one.text), ", ".join(links)]
-            yield "| " + " | ".join(cells if tested else cells[:1]) + " |"
+            if one.page == page and one.kind == kind:
+                tests = ", ".join(map(write_test, one.markers))
+                yield f"| {write_cell(one.text)} |" + (f" {tests} |" if tests else "")
         yield ""
+
+
+def write_test(marker: Marker) -> str:
+    """Return a link to the file of a test, and its bound if that is wider."""
+    link = f"[{marker.test}](../../{marker.file})"
+    return f"{link}: {marker.bound}" if marker.bound else link
 
 
 def write_page(promises: list[Promise]) -> str:
     """Return the page."""
-    count = len(promises)
-    shown = sum(bool(one.tests) for one in promises)
+    shown, wider, none = (
+        sum(one.kind == kind for one in promises) for kind in ("shown", "wider", "none")
+    )
     lines = [
         HEAD,
-        f"Of {count} promises {shown} have a test, and {count - shown} have none.\n",
+        f"Of {len(promises)} promises {shown} are shown by tests, {wider} by tests with a wider",
+        f"bound only, and {none} by none.\n",
         "## Shown by tests\n",
-        *write_rows(promises, tested=True),
+        *write_rows(promises, "shown"),
+        "## Tested to a wider bound\n",
+        *write_rows(promises, "wider"),
         "## Without a test\n",
-        *write_rows(promises, tested=False),
+        *write_rows(promises, "none"),
     ]
     return "\n".join(lines).rstrip() + "\n"
 

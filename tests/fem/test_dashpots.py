@@ -288,6 +288,7 @@ def test_waves_at_right_angles_leave_a_box(comm, wave, axis, moves, solver):
         pytest.param(True, vc.Iterative(tolerance=1e-12), marks=pytest.mark.serial),
     ],
 )
+@pytest.mark.promise("guide/soil.md", "to the last digits, in all three components")
 def test_compliant_base_of_a_box(comm, simplices, solver):
     """V8.2 in three components at once, P impedance for the vertical one: the discrete column to
     round-off, and the outcrop's motion at the surface (1 %)."""

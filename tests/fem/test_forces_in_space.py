@@ -75,6 +75,7 @@ def above(y: float, slope: float) -> Array:
 
 @shapes
 @pytest.mark.parametrize("turn", [0, 3])
+@pytest.mark.promise("guide/outputs.md", "Tests compare it with statics to 1e-10")
 def test_sections_of_a_column_are_those_of_statics(comm: Any, simplices: bool, turn: int) -> None:
     """Along faces of the mesh, through elements, inclined, in any orientation: all six to 1e-10;
     the foot's are minus its reactions."""

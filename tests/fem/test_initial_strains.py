@@ -156,6 +156,7 @@ def layer(h: float, d: int = 2) -> tuple[Any, Any, Any]:
 
 
 @pytest.mark.parametrize("h", [0.5, 0.125])
+@pytest.mark.promise("guide/bring_your_own.md", "leaves the stress -E b/L to round-off")
 def test_a_dislocation_moves_half_a_body_or_strains_one_that_is_held(h):
     """A jump b = (opening, slip): beyond the layer u = b and no stress; between held ends -(M b_x,
     mu b_y) / L, which no longer knows the layer."""
@@ -201,6 +202,7 @@ def between_walls(gap: float, history: Any = None) -> ContactProblem:
     return ContactProblem(system, fem.contact_surface(system, tags["top"], obstacle=ceiling))
 
 
+@pytest.mark.promise("guide/bring_your_own.md", "Both routes give E/(1 - nu²)")
 def test_warming_closes_a_gap_and_presses_by_both_routes():
     """Plane strain, free sides: p = E / (1 - nu²) ((1 + nu) alpha dT - g / H), nothing before the
     gap is closed."""

@@ -154,6 +154,8 @@ def test_time_step(model):
     assert errors[1] < 0.1 * errors[0]
 
 
+@pytest.mark.promise("guide/rocking_block.md", "This is the round-off of the strain energy")
+@pytest.mark.promise("guide/rocking_block.md", "closes to 3e-7 J", bound="six times as much")
 def test_ledger(model):
     """V9.7 for V3.1: the ledger closes to 1e-11 of the largest energy and the round-off of uᵀKu.
 
@@ -185,6 +187,8 @@ def lifted(model: rocking.RockingModel, peak: float) -> tuple[float, float, floa
     return gap, least, angle
 
 
+@pytest.mark.promise("guide/rocking_block.md", "The condition holds to 0.2 %")
+@pytest.mark.promise("guide/rocking_block.md", "lifts one when its peak is 1 % above")
 def test_onset(model):
     """V3.1: rocking starts at g b/h = 1.962 m/s²: 1 % less lifts nothing, 1 % more does. The mesh's
     own criterion, the moment of its inertia load, holds to 0.2 %."""
