@@ -79,8 +79,8 @@ _PROMISE = re.compile(
 _ASIDE = re.compile(
     r"\brefuse[sd]?\b|\bfirst corrected\b|[Bb]utterworth|rounding unit|\bcounts? as\b|eigenvalue"
     r"|not reproduced|not at round-off|iterations? to|unit of u|[Pp]rograms differ|rings \("
-    r"|depends? on|adds? up|that damps|between alpha and b/h|Anderson|factorise nothing"
-    r"|oscillates|may miss|is rounded to|adds? up|which is 1e-9|off symmetry|off by"
+    r"|depends?\b|adds? up|that damps|between alpha and b/h|Anderson|factorise nothing"
+    r"|oscillates|may miss|is rounded to|measured at|squared error|which is 1e-9|off symmetry|off by"
 )
 
 

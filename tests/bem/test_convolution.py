@@ -144,6 +144,9 @@ def test_rod_under_a_smooth_load(operators):
     assert errors[1] < 3.4e-3 and np.log2(errors[0] / errors[1]) > 2.4
 
 
+@pytest.mark.promise(
+    "theory/bem.md", "6 times the error with Radau, and overshoots by 6 %", bound="12 %"
+)
 def test_rod_under_a_step(operators):
     """B11: top displacement, reaction of the base (exactly 0 or 2) and its greatest value; fronts
     smear and ring."""
@@ -199,6 +202,7 @@ def test_energetic_and_convolution_agree(operators):
     assert np.linalg.norm(difference) < 5e-3 * np.linalg.norm(energetic.displacement)
 
 
+@pytest.mark.promise("theory/bem.md", "wraps around the circle is 1.5e-8", bound="1e-6")
 def test_compliance_is_the_inverse_seen_from_the_contact(operators):
     """u_c = W * lam + u_free is what solve() gives, to what wraps around; supported unknowns zero;
     W_0 symmetric."""

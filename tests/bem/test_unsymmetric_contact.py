@@ -76,6 +76,7 @@ def differences(k: int, law: str) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("law", LAWS)
+@pytest.mark.promise("theory/bem.md", "Certificates of the unsymmetric steps", bound="1e-13")
 def test_both_forms_meet(law):
     """Every step certified; impulses and energies: measured 0.16 to 0.22 % and 0.5 to 0.6 % at
     k = 5, half of that at k = 10."""

@@ -44,7 +44,13 @@ def figures() -> ModuleType:
     return found
 
 
-@pytest.mark.parametrize("name", ["inequality", "ledger"])
+@pytest.mark.promise("theory/certificate.md", "In all of its 900 steps the certificate stays below")
+@pytest.mark.promise("theory/certificate.md", "This error falls from 19 % with 10 elements")
+@pytest.mark.promise("theory/condensation.md", "both agree over 40 steps to better than 1e-9")
+@pytest.mark.promise("theory/ledger.md", "Every step is solved to round-off")
+@pytest.mark.promise("theory/ledger.md", "It is as small as rounding and the tolerance")
+@pytest.mark.promise("theory/ledger.md", "at the end its defect is 25 % of the initial energy")
+@pytest.mark.parametrize("name", ["inequality", "certificate", "ledger", "condensation"])
 def test_pages_state_what_their_figures_show(
     figures: ModuleType, name: str, tmp_path: Path
 ) -> None:

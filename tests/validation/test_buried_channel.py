@@ -61,6 +61,10 @@ def test_v4_2_same_as_an_independent_program():
 
 
 @pytest.mark.parametrize("contact", ["sliding", "rubbing", "bilateral"])
+@pytest.mark.promise("guide/channel.md", "is certified to 1e-12", bound="1e-9, in a shorter run")
+@pytest.mark.promise(
+    "guide/channel.md", "the ledgers close to 6e-13", bound="1e-10, in a shorter run"
+)
 def test_v4_2_certificates_and_ledger(contact):
     """V9.7: every step to 1e-9, ledger to 1e-10; the step and the M-orthogonal impact rule create
     no energy (V9.1, V9.6)."""

@@ -87,6 +87,9 @@ def first_impact(model: rocking.RockingModel, theta0: float) -> float:
 
 
 @pytest.mark.serial
+@pytest.mark.promise(
+    "guide/rocking_block.md", "The certificate of the worst step is 1.2e-13", bound="1e-9"
+)
 def test_free_rocking(model):
     """V3.1: impact times within 2 %, amplitudes and restitution within 5 %; the rigid limit to 0.3,
     0.5 and 0.5 %. Every step is certified to 1e-9, and each impact takes 1 - e² of the energy to 2

@@ -134,6 +134,7 @@ LEDGERS = {
 
 @one_rank
 @pytest.mark.parametrize("case", LEDGERS)
+@pytest.mark.promise("start/model.md", "defect stays at rounding")
 def test_v4_1_energy_ledger(case):
     """Input work = reset loss + contact work of the steps + energy at the end [J], closed to
     round-off (V9.7)."""
