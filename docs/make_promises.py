@@ -16,6 +16,7 @@ import re
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -80,7 +81,8 @@ _ASIDE = re.compile(
     r"\brefuse[sd]?\b|\bfirst corrected\b|[Bb]utterworth|rounding unit|\bcounts? as\b|eigenvalue"
     r"|not reproduced|not at round-off|iterations? to|unit of u|[Pp]rograms differ|rings \("
     r"|depends?\b|adds? up|that damps|between alpha and b/h|Anderson|factorise nothing"
-    r"|oscillates|may miss|is rounded to|measured at|squared error|which is 1e-9|off symmetry|off by"
+    r"|oscillates|may miss|is rounded to|measured at|squared error|which is 1e-9"
+    r"|off symmetry|off by"
 )
 
 
@@ -145,21 +147,30 @@ def is_promise(sentence: str) -> bool:
     return bool(_PROMISE.search(sentence)) and not _ASIDE.search(sentence)
 
 
-def read_markers() -> Iterator[Marker]:
-    """Yield the markers of all tests, in the order of files; no test is imported."""
-    for path in sorted([*(ROOT / "tests").rglob("test_*.py"), *DOCS.rglob("test_*.py")]):
-        source = path.read_text(encoding="utf-8")
-        if "mark.promise(" not in source:
-            continue
-        for test in ast.walk(ast.parse(source)):
-            if not isinstance(test, ast.FunctionDef):
-                continue
+@cache
+def read_tests() -> dict[str, str]:
+    """Return the text of the files of tests that have markers, by their names in the clone."""
+    paths = sorted([*(ROOT / "tests").rglob("test_*.py"), *DOCS.rglob("test_*.py")])
+    texts = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in paths}
+    return {file: text for file, text in texts.items() if "@pytest.mark.promise(" in text}
+
+
+@cache
+def read_markers() -> tuple[Marker, ...]:
+    """Return the markers of all tests, in the order of files; no test is imported.
+
+    Tests are functions of a module.
+    """
+    markers = []
+    for file, text in read_tests().items():
+        tests = [node for node in ast.parse(text).body if isinstance(node, ast.FunctionDef)]
+        for test in tests:
             for mark in test.decorator_list:
-                if isinstance(mark, ast.Call) and ast.unparse(mark.func).endswith("mark.promise"):
+                if isinstance(mark, ast.Call) and ast.unparse(mark.func) == "pytest.mark.promise":
                     page, piece = (ast.literal_eval(argument) for argument in mark.args)
                     bounds = [ast.literal_eval(keyword.value) for keyword in mark.keywords]
-                    file = path.relative_to(ROOT).as_posix()
-                    yield Marker(page, piece, file, test.name, "".join(bounds))
+                    markers.append(Marker(page, piece, file, test.name, "".join(bounds)))
+    return tuple(markers)
 
 
 def gather() -> tuple[list[Promise], list[Marker]]:
