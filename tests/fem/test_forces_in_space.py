@@ -238,6 +238,7 @@ def test_one_leg_of_two(comm: Any) -> None:
 # --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.promise("guide/outputs.md", "R is -D v + 2 D v_up to 1e-10")
 def test_a_compliant_base_carries_all_momentum(comm: Any) -> None:
     """Base shear in three components of a block on soil that lets a wave in: rates of momentum and
     angular momentum of all masses, and rho c A (2 v_up - v) of the dashpots."""
