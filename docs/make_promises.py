@@ -67,6 +67,9 @@ _PROMISE = re.compile(
     # right to 2 %, differ by 0.5 %: a share is a bound beside a word that compares
     rf"|\b{_JUDGES}\b[^.;]{{0,120}}?\b(?:to|within|by|below|most|than|is) (?:{_FEW} )?{_SHARE}"
     rf"|\b(?:within|to) (?:{_FEW} )?{_SHARE}[^.;]{{0,60}}\b{_JUDGES}\b"
+    rf"|(?<!\d )\bto {_SHARE}\.?$|{_SHARE} too (?:small|large|high|low|long|far|stiff)\b"
+    # a step above 1e-9 is not accepted
+    rf"|\baccepts?\b[^.;]*{_SMALL}"
     # to round-off, to the last bit, all digits
     rf"|\b(?:to|but|at|than|as|is|are) (?:the )?{_EXACT}"
     r"|\b(?:[Dd]igit by digit|digit for digit|[Bb]it (?:by|for) bit)\b"
@@ -81,7 +84,7 @@ _ASIDE = re.compile(
     r"\brefuse[sd]?\b|\bfirst corrected\b|[Bb]utterworth|rounding unit|\bcounts? as\b|eigenvalue"
     r"|not reproduced|not at round-off|iterations? to|unit of u|[Pp]rograms differ|rings \("
     r"|depends?\b|adds? up|that damps|between alpha and b/h|Anderson|factorise nothing"
-    r"|oscillates|may miss|is rounded to|measured at|squared error|which is 1e-9"
+    r"|oscillates|may miss|is rounded to|measured at|squared error"
     r"|off symmetry|off by"
 )
 

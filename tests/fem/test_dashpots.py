@@ -40,6 +40,7 @@ def hit_column(comm, wave, factor=1.0, **data):
 
 
 @pytest.mark.parametrize("wave", WAVES)
+@pytest.mark.promise("guide/soil.md", "1e-6 of the energy is left with 20 cells", bound="1e-4")
 def test_waves_at_right_angles_leave(comm, wave):
     """V8.1: what is left of the energy after the passage is below 1e-4 at 20 points per
     wavelength."""

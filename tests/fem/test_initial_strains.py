@@ -233,6 +233,11 @@ def warmed_bar(n: int, gap: float) -> ContactProblem:
 
 
 @pytest.mark.serial
+@pytest.mark.promise(
+    "guide/bring_your_own.md",
+    "is 0.02 % too small in the middle of the push",
+    bound="0.4 and 4.5 %, on 40 cells",
+)
 def test_sudden_warming_sends_waves_of_its_stress():
     """By characteristics, g = alpha dT L, T = L/c: the tip moves by c alpha dT until T, is held by
     E alpha dT until 2T, and leaves; the support pushes by E alpha dT until T and pulls as much from

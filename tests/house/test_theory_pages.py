@@ -51,6 +51,8 @@ def figures() -> ModuleType:
 @pytest.mark.promise("theory/ledger.md", "It is as small as rounding and the tolerance")
 @pytest.mark.promise("theory/ledger.md", "at the end its defect is 25 % of the initial energy")
 @pytest.mark.parametrize("name", ["inequality", "certificate", "ledger", "condensation"])
+@pytest.mark.promise("theory/ledger.md", "At the end 31.1 % of it")
+@pytest.mark.promise("theory/certificate.md", "A reaction that is wrong by the relative size")
 def test_pages_state_what_their_figures_show(
     figures: ModuleType, name: str, tmp_path: Path
 ) -> None:
@@ -323,6 +325,8 @@ SOLVED: dict[str, Callable[[ModuleType], list[str]]] = {
 
 
 @pytest.mark.parametrize("name", SOLVED)
+@pytest.mark.promise("theory/solutions.md", "with 1/40 and 1/80 s are")
+@pytest.mark.promise("theory/solutions.md", "The penetration may be")
 def test_solutions_state_what_the_program_finds(
     figures: ModuleType, name: str, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -133,6 +133,9 @@ def test_period_at_housners_angle(model, share):
     assert 4.0 * first_impact(model, share * SHAPE.alpha) == pytest.approx(PERIODS[share], rel=0.02)
 
 
+@pytest.mark.promise(
+    "guide/rocking_block.md", "tends to the rigid one like 1/E", bound="1e-3, falling like 1/E"
+)
 def test_stiffness(model):
     """V3.1: E -> infinity. The time of the first impact tends to the rigid limit like 1/E."""
     theta0 = 0.5 * SHAPE.alpha
