@@ -87,6 +87,7 @@ def bound(printed: str) -> float:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", TABLE, ids=lambda case: f"{case[0]}-{case[1]}")
+@pytest.mark.promise("theory/beam.md", "The tests compare every number")
 def test_reference_rows(runs: dict[tuple[float, str], BeamRun], case: tuple[float, str]) -> None:
     """V6.1: every number to half a unit of its last digit (and 1e-6 of it)."""
     found, history = runs[case], runs[case].history
@@ -102,6 +103,9 @@ def test_reference_rows(runs: dict[tuple[float, str], BeamRun], case: tuple[floa
     assert found.energy[0] == pytest.approx(125.0 / 6.0 + 100.0 * 5.0 / (2.0 * 200.0**2), rel=1e-9)
 
 
+@pytest.mark.promise("theory/beam.md", "energy balance below closes to 3e-9 J", bound="1e-8 J")
+@pytest.mark.promise("theory/beam.md", "This holds within 3.3e-9 J", bound="1e-8 J")
+@pytest.mark.promise("theory/beam.md", "takes 65 % and 42 % of the energy")
 def test_invariants(runs: dict[tuple[float, str], BeamRun]) -> None:
     """V6.1, hard: energy falls in every step, E(0) - E(t) is viscous plus friction loss to 1e-8,
     both losses grow; A and B under a2 = 0.001 lose most of it by friction, 65 and 42 %."""
@@ -130,6 +134,7 @@ def test_qualitative_statements(runs: dict[tuple[float, str], BeamRun]) -> None:
         assert 0.7 < turn < 0.9 and elastic.history["u_tip"][-1] > 0.9
 
 
+@pytest.mark.promise("theory/beam.md", "it stays constant within 3e-10 J", bound="2.5e-9 J")
 def test_without_viscosity_and_friction_energy_stays() -> None:
     """V6.1: "an unreasonable increase of the energy" for very small a2 is no property of the
     scheme."""
@@ -169,6 +174,7 @@ def test_published_newton_can_run_away() -> None:
     assert found.history["newton"].max() < 20
 
 
+@pytest.mark.promise("theory/beam.md", "both give the same results to the last bit")
 def test_safeguard_and_relative_tolerance_change_nothing() -> None:
     """Where the published iteration converges, the safeguarded one goes the same way."""
     forces = source.readings()

@@ -51,6 +51,7 @@ def algorithm(friction: Any, elements: Elements, dt: float, steps: int, **given:
 @pytest.mark.parametrize(
     "elements", [Elements(50), Elements(50, reduced_shear=False, published_end=True)]
 )
+@pytest.mark.promise("theory/beam.md", "They agree within 1e-13 m", bound="1e-11 m")
 def test_exact_law_through_the_contract(elements: Elements) -> None:
     """Given force, Coulomb: Midpoint and the condensed solver do what Algorithm 10 does with the
     inequality itself; the tip slips, sticks and slips back."""
@@ -71,6 +72,7 @@ def test_exact_law_through_the_contract(elements: Elements) -> None:
     )
 
 
+@pytest.mark.promise("theory/beam.md", "the difference falls with the first order of eps")
 def test_convergence_as_eps_vanishes() -> None:
     """Motion and friction loss of (7.1) tend to those of the inequality with order 1."""
     elements = Elements(50)
@@ -85,6 +87,7 @@ def test_convergence_as_eps_vanishes() -> None:
     assert np.all(np.abs(orders - 1.0) < 0.12) and errors[-1][0] < 1e-4
 
 
+@pytest.mark.promise("theory/beam.md", "which is order 1")
 def test_rate_dependent_friction() -> None:
     """mu = |rate|/100: of the old step in Algorithm 10, of the step itself in SlipRateCoulomb;
     order 1 between them."""
@@ -101,6 +104,9 @@ def test_rate_dependent_friction() -> None:
     assert apart[0] < 0.01 and apart[0] / apart[1] == pytest.approx(2.0, rel=0.05)
 
 
+@pytest.mark.promise(
+    "theory/beam.md", "the error falls with order 0.6 to 0.8", bound="0.003, order 0.4 to 0.95"
+)
 def test_rod_of_period_three() -> None:
     """V1.3 with the wall on the right: displacement of the tip, contact impulse 1/2 a period,
     energy; observed order between 0.4 and 0.95."""
@@ -134,6 +140,7 @@ def test_rod_ledger() -> None:
     assert np.abs(history["energy_defect"]).max() <= 2.0 * rounded(problem, 0.5)
 
 
+@pytest.mark.promise("theory/beam.md", "The static contact force is right to 1e-3 N")
 def test_rod_comes_to_rest() -> None:
     """Kelvin-Voigt, V9.1's scheme: the mean contact force tends to end force + half the body force
     - E A gap/l."""
@@ -145,6 +152,7 @@ def test_rod_comes_to_rest() -> None:
     assert quiet[-2:] == pytest.approx(52.0, abs=1e-3)
 
 
+@pytest.mark.promise("theory/beam.md", "is right to 1e-3.")
 def test_rod_viscosity() -> None:
     """Free decay of the first mode, sin(pi x/2l), with the rate viscosity omega²/2."""
     rod = Rod(1.0, 1.0, 1.0, 4.0, viscosity=0.02, gap=10.0)
@@ -166,6 +174,7 @@ def rubbing() -> tuple[Array, Array, Array, float]:
     return histories(problem, 0.005, 400)
 
 
+@pytest.mark.promise("theory/beam.md", "the results agree within 1e-11 m", bound="1e-10 m")
 def test_the_rod_drives_the_friction(rubbing: tuple[Array, Array, Array, float]) -> None:
     """One problem for both gives what rod first, beam second gives; regularised: order 1 in eps."""
     tip, r_n, friction, worst = rubbing

@@ -104,6 +104,9 @@ def source_traction(x: np.ndarray, normals: np.ndarray) -> np.ndarray:
     "mesh", [polygon(SQUARE, 0.2), polygon([(0, 0), (1, 0.1), (0.2, 0.8)], 0.2)]
 )
 @pytest.mark.parametrize("t", [0.13, 0.2, 0.61, 2.5])
+@pytest.mark.promise("theory/bem.md", "The error of the quadrature is 3e-5", bound="5e-5")
+@pytest.mark.promise("theory/bem.md", "3e-5 on the square with k = 10", bound="5e-5")
+@pytest.mark.promise("theory/bem.md", "4e-5 on a triangle", bound="5e-5")
 def test_quadrature_split_at_the_fronts(mesh, t):
     """B2: default points against many more, fronts at, inside and past the elements; 5e-5 of the
     greatest entry."""

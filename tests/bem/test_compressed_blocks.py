@@ -72,6 +72,7 @@ def expanded(short: CompressedBlocks) -> EnergeticBlocks:
 
 
 @pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.promise("theory/bem.md", "it bounds every entry of V, K and D")
 def test_blocks(shape):
     """Entries differ from exact ones by less than their bounds, which are small; before tails by
     rounding only."""

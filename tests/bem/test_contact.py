@@ -246,6 +246,7 @@ def test_two_bodies_that_are_mirror_images():
     )
 
 
+@pytest.mark.promise("theory/bem.md", "Two welded halves move like one square to 1 %")
 def test_a_weld_is_no_cut():
     """B8: two halves welded move together at the weld, to round-off, and like one body of their
     height, to O(h²)."""

@@ -82,6 +82,8 @@ def top_error(operator: ConvolutionOperator, load, integral) -> float:
     return float(np.sqrt(np.mean((top - exact) ** 2) / np.mean(exact**2)))
 
 
+@pytest.mark.promise("theory/bem.md", "The method keeps its order 3 in time")
+@pytest.mark.promise("theory/bem.md", "With means over whole steps it is of order 2")
 def test_weights_of_an_oscillator():
     """C(s) = 1/(s² + 0.6 s + 9) under sin⁴ t against the exact answer: order 3; held g: order 2."""
     w2, damping, end, errors, held = 9.0, 0.6, 4.0, [], []
@@ -122,6 +124,7 @@ def oscillator(w2: float, damping: float, times: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.slow
+@pytest.mark.promise("theory/bem.md", "those of the direct quadrature to 1e-11", bound="1e-10")
 def test_table_of_radial_functions(operators):
     """The matrices from the table are those of the Galerkin layer at frequencies of the whole
     range."""
@@ -141,6 +144,9 @@ def test_rod_under_a_smooth_load(operators):
     assert errors[1] < 3.4e-3 and np.log2(errors[0] / errors[1]) > 2.4
 
 
+@pytest.mark.promise(
+    "theory/bem.md", "6 times the error with Radau, and overshoots by 6 %", bound="12 %"
+)
 def test_rod_under_a_step(operators):
     """B11: top displacement, reaction of the base (exactly 0 or 2) and its greatest value; fronts
     smear and ring."""
@@ -185,6 +191,7 @@ def test_plane_pulses(operators, shear):
     assert errors[1] < 0.03 and np.log2(errors[0] / errors[1]) > 2.0
 
 
+@pytest.mark.promise("theory/bem.md", "Radau differ by 4.7e-3 at k = 10", bound="5e-3")
 def test_energetic_and_convolution_agree(operators):
     """B11: top of the rod under the smooth load, Radau against energetic, 10 elements a side."""
     problem = rod(operators[10], smooth_load)
@@ -195,6 +202,7 @@ def test_energetic_and_convolution_agree(operators):
     assert np.linalg.norm(difference) < 5e-3 * np.linalg.norm(energetic.displacement)
 
 
+@pytest.mark.promise("theory/bem.md", "wraps around the circle is 1.5e-8", bound="1e-6")
 def test_compliance_is_the_inverse_seen_from_the_contact(operators):
     """u_c = W * lam + u_free is what solve() gives, to what wraps around; supported unknowns zero;
     W_0 symmetric."""

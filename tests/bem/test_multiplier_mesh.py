@@ -207,6 +207,7 @@ def test_a_front_inside_of_an_interval():
     assert mean == pytest.approx(exact, abs=0.3 * swing)  # the front is a step wide
 
 
+@pytest.mark.promise("theory/bem.md", "gives the plain mean digit for digit")
 def test_the_weight():
     """B15: sigma = 0 are the means, digit for digit; the answer moves by O(sigma DT); with the
     weight the swing of the rod grows by (1 - theta)/theta an interval, theta the weighted middle,

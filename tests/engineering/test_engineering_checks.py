@@ -50,6 +50,7 @@ def worst_wedge(
         (40.0, 20.0, -5.0, 10.0, 15.0),
     ],
 )
+@pytest.mark.promise("guide/checks.md", "agrees to 1e-8 with a search over all planes")
 def test_worst_wedge(angles: tuple[float, ...]) -> None:
     """K is the maximum over all planes of the equilibrium of one wedge, to round-off of the
     search."""

@@ -40,6 +40,7 @@ def hit_column(comm, wave, factor=1.0, **data):
 
 
 @pytest.mark.parametrize("wave", WAVES)
+@pytest.mark.promise("guide/soil.md", "1e-6 of the energy is left with 20 cells", bound="1e-4")
 def test_waves_at_right_angles_leave(comm, wave):
     """V8.1: what is left of the energy after the passage is below 1e-4 at 20 points per
     wavelength."""
@@ -288,6 +289,7 @@ def test_waves_at_right_angles_leave_a_box(comm, wave, axis, moves, solver):
         pytest.param(True, vc.Iterative(tolerance=1e-12), marks=pytest.mark.serial),
     ],
 )
+@pytest.mark.promise("guide/soil.md", "to the last digits, in all three components")
 def test_compliant_base_of_a_box(comm, simplices, solver):
     """V8.2 in three components at once, P impedance for the vertical one: the discrete column to
     round-off, and the outcrop's motion at the surface (1 %)."""

@@ -75,6 +75,7 @@ def above(y: float, slope: float) -> Array:
 
 @shapes
 @pytest.mark.parametrize("turn", [0, 3])
+@pytest.mark.promise("guide/outputs.md", "Tests compare it with statics to 1e-10")
 def test_sections_of_a_column_are_those_of_statics(comm: Any, simplices: bool, turn: int) -> None:
     """Along faces of the mesh, through elements, inclined, in any orientation: all six to 1e-10;
     the foot's are minus its reactions."""
@@ -237,6 +238,7 @@ def test_one_leg_of_two(comm: Any) -> None:
 # --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.promise("guide/outputs.md", "R is -D v + 2 D v_up to 1e-10")
 def test_a_compliant_base_carries_all_momentum(comm: Any) -> None:
     """Base shear in three components of a block on soil that lets a wave in: rates of momentum and
     angular momentum of all masses, and rho c A (2 v_up - v) of the dashpots."""

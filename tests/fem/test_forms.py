@@ -352,6 +352,7 @@ def leaning(comm: Any) -> tuple[Any, Any]:
 
 
 @pytest.mark.two_ranks
+@pytest.mark.promise("guide/solvers.md", "Both agree to 1e-8 on a block whose stiffness")
 def test_stiffness_that_is_not_symmetric(comm: Any) -> None:
     """Both methods of the volume route and Lemke's agree, statically, certified and partly open,
     and in dynamics; reactions are rows of K u - f; routes that need symmetry say so, as does the

@@ -47,6 +47,7 @@ def above(y: float) -> dict[str, float]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("simplices", [False, True], ids=["quadrilaterals", "triangles"])
+@pytest.mark.promise("guide/outputs.md", "Tests compare it with statics to 1e-10")
 def test_section_forces_are_those_of_equilibrium(comm: Any, simplices: bool) -> None:
     """N, V, M of a cantilever under tip, uniform and body loads to 1e-10, on a mesh two elements
     wide."""
@@ -423,6 +424,7 @@ def test_friction_resultants_are_the_recorded_forces(comm: Any) -> None:
 
 
 @pytest.mark.serial
+@pytest.mark.promise("guide/outputs.md", "the contact forces above the cut to 1e-8")
 def test_wall_of_the_channel_is_in_equilibrium(comm: Any) -> None:
     """Buried channel after gravity, with friction: its weight is the contact force on base and
     walls, and N, V, M at the foot of a wall are those of the wall's weight and of the contact

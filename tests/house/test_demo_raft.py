@@ -22,6 +22,7 @@ FIGURES = ("motions", "moments", "energy", "certificate")
 
 @pytest.mark.slow
 @pytest.mark.serial
+@pytest.mark.promise("guide/raft.md", "The worst certificate is 3e-11", bound="1e-9 and 1e-10")
 def test_the_raft_demo(shared_tmp, capsys):
     """It stands closed, lifts off and slides, certified, with a closed ledger; friction bounds the
     base shear."""
@@ -68,6 +69,7 @@ def files_of_paraview(folder: Path, frames: int) -> None:
 
 
 @pytest.mark.serial
+@pytest.mark.promise("guide/raft.md", "the numbers of the demo to round-off", bound="1e-7")
 def test_the_case_of_the_raft(comm, shared_tmp, monkeypatch):
     """Twenty steps of the case file, gravity, release and compliant base, are the demo's under the
     case's motions."""

@@ -55,6 +55,11 @@ def test_a_plate_on_any_number_of_ranks(comm: Any) -> None:
 
 @pytest.mark.serial
 @pytest.mark.slow
+@pytest.mark.promise("guide/bring_your_own.md", "force within 1e-12", bound="1e-9")
+@pytest.mark.promise("guide/bring_your_own.md", "the route on all unknowns agree within 2e-8")
+@pytest.mark.promise("guide/bring_your_own.md", "leaves a residual of at most 4e-10", bound="1e-9")
+@pytest.mark.promise("guide/bring_your_own.md", "the ledger closes within 6e-12", bound="1e-10")
+@pytest.mark.promise("guide/bring_your_own.md", "length exact; height 0.6 % on 20 elements")
 def test_the_demo_of_structures(
     comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

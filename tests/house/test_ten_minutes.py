@@ -6,10 +6,12 @@ import csv
 import math
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pictures import is_drawn
 
+import vi_contact as vc
 from vi_contact.practice.cli import main
 
 pytestmark = pytest.mark.serial
@@ -105,6 +107,11 @@ def test_your_wall(
         assert now == pytest.approx([float(one) for one in told], rel=0.02)
 
 
+@pytest.mark.promise("start/ten_minutes_form.md", "They agree to 0.06 %.")
+@pytest.mark.promise("start/ten_minutes_form.md", "The first is round-off.")
+@pytest.mark.promise(
+    "start/ten_minutes_form.md", "Here the displacements of both agree", bound="1e-11"
+)
 def test_your_form(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -116,6 +123,16 @@ def test_your_form(
     )
     assert len(code.splitlines()) <= 60
     monkeypatch.chdir(tmp_path)
-    exec(compile(code, "form.py", "exec"), {"__name__": "__main__"})
+    names: dict[str, Any] = {"__name__": "__main__"}
+    exec(compile(code, "form.py", "exec"), names)
     assert capsys.readouterr().out == printed
     assert is_drawn(tmp_path / "form.png")
+    assert names["here"] == pytest.approx(names["impulse"], rel=6e-4)
+    facts = names["solution"].facts
+    assert 0.0 < facts["energy_defect"] < 1e-11 and facts["energy_created"] < 1e-12
+    both = vc.CrossChecked(vc.Condensed(), [vc.Volume()])
+    again = vc.simulate(
+        names["problem"], dt=1e-3, steps=60, solver=both, cross_check=both, progress=False
+    )
+    (compared,) = again.facts["cross_check"].values()
+    assert 0.0 < compared["u"] < 1e-11 and 0.0 < compared["r_n"] < 1e-11

@@ -44,7 +44,15 @@ def figures() -> ModuleType:
     return found
 
 
-@pytest.mark.parametrize("name", ["inequality", "ledger"])
+@pytest.mark.promise("theory/certificate.md", "In all of its 900 steps the certificate stays below")
+@pytest.mark.promise("theory/certificate.md", "This error falls from 19 % with 10 elements")
+@pytest.mark.promise("theory/condensation.md", "both agree over 40 steps to better than 1e-9")
+@pytest.mark.promise("theory/ledger.md", "Every step is solved to round-off")
+@pytest.mark.promise("theory/ledger.md", "It is as small as rounding and the tolerance")
+@pytest.mark.promise("theory/ledger.md", "at the end its defect is 25 % of the initial energy")
+@pytest.mark.parametrize("name", ["inequality", "certificate", "ledger", "condensation"])
+@pytest.mark.promise("theory/ledger.md", "At the end 31.1 % of it")
+@pytest.mark.promise("theory/certificate.md", "A reaction that is wrong by the relative size")
 def test_pages_state_what_their_figures_show(
     figures: ModuleType, name: str, tmp_path: Path
 ) -> None:
@@ -317,6 +325,8 @@ SOLVED: dict[str, Callable[[ModuleType], list[str]]] = {
 
 
 @pytest.mark.parametrize("name", SOLVED)
+@pytest.mark.promise("theory/solutions.md", "with 1/40 and 1/80 s are")
+@pytest.mark.promise("theory/solutions.md", "The penetration may be")
 def test_solutions_state_what_the_program_finds(
     figures: ModuleType, name: str, caplog: pytest.LogCaptureFixture
 ) -> None:

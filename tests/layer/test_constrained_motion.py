@@ -39,6 +39,9 @@ def collide(layer: Layer, **more) -> LayerContact:
     return layer_motion(PLANE, layer, **settings).contacts[0]
 
 
+@pytest.mark.promise(
+    "theory/boundary_layer.md", "differs from the closed form by 3e-10", bound="1e-9"
+)
 def test_particle():
     """V5.1, all pairs in closed form: table to its digits; every fourth one by integration: closed
     form to 1e-9, times of the events too."""
@@ -237,6 +240,8 @@ def test_metric_and_affinities():
 
 # Equality constraints
 # ------------------------------------------------------------------------------------------------
+@pytest.mark.promise("theory/boundary_layer.md", "Its period agrees with the elliptic integral")
+@pytest.mark.promise("theory/boundary_layer.md", "The constraint holds to 1e-9 over a period")
 def test_pendulum():
     """(29) to (34): a rod of length 1 m from 1 rad: period, tension below, and the constraint
     without drift."""
@@ -257,6 +262,7 @@ def test_pendulum():
     assert np.max(np.abs(motion.phi)) < 1e-9
 
 
+@pytest.mark.promise("theory/boundary_layer.md", "says, to 1e-11")
 def test_slider_returns_to_its_line():
     """(34): with spring and damper an error in phi fades as m̄ φ̈ + c̄ φ̇ + k̄ φ = 0; two
     constraints fix the point."""
@@ -276,6 +282,9 @@ def test_slider_returns_to_its_line():
     assert np.max(np.abs(held.q)) < 1e-14
 
 
+@pytest.mark.promise(
+    "theory/boundary_layer.md", "from that of the rod by 2.2e-4", bound="3e-4, falling with b"
+)
 def test_a_string_in_the_layer_tends_to_the_rod():
     """The same pendulum on a string, rho = L - |q| >= 0: its tension differs from the rod's by
     O(b)."""

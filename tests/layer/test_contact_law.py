@@ -53,6 +53,7 @@ def stiff(e: float, metric: Metric, *, dt: float, elements: int = 1, E: float = 
 
 @serial
 @pytest.mark.parametrize("metric", [Metric.BLENDED, Metric.FLAT])
+@pytest.mark.promise("theory/boundary_layer.md", "BLENDED is within 1e-4", bound="5e-3")
 def test_rebound_of_a_stiff_body(metric):
     """The wanted restitution, within 0.5 % (asked for: 1 %) with dt = b/(20 V)."""
     for e in (1.0, 0.5):
@@ -63,6 +64,7 @@ def test_rebound_of_a_stiff_body(metric):
 
 
 @serial
+@pytest.mark.promise("theory/boundary_layer.md", "is of order 2 and exact in the energy")
 def test_order_two():
     """Halving the step divides the error of the rebound by four."""
     for metric in (Metric.BLENDED, Metric.FLAT):

@@ -81,6 +81,7 @@ def test_closed_form_satisfies_the_equation_of_motion():
     assert abs(residual) < 1e-8
 
 
+@pytest.mark.promise("theory/boundary_layer.md", "both are exactly equal")
 def test_newton_and_poisson():
     """(37), (38), V5.1: equal for the force on the particle, virtually indistinguishable for the
     covector force."""

@@ -274,6 +274,11 @@ def test_numbers_of_the_report(tmp_path: Path) -> None:
     assert "1.0e-13 of the largest energy (8 J)" in certificate.sentences[2]
 
 
+@pytest.mark.promise(
+    "guide/report.md",
+    "0.7 % at 4 ms and 0.05 % at 1 ms",
+    bound="2.1 %, falling with the square of the step",
+)
 def test_low_passed_peaks_converge_where_raw_ones_do_not() -> None:
     """A velocity jump of 1 m/s in one step: raw peaks double with every half step, those below 25
     Hz are 51 m/s² (V11.2)."""

@@ -188,6 +188,8 @@ def test_kill_9(tmp_path: Path) -> None:
 # --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.promise("guide/go_on.md", "all numbers agree to the last bit")
+@pytest.mark.promise("guide/go_on.md", "On several ranks they agree to round-off")
 def test_restart_on_the_same_ranks(comm: Any, shared_tmp: Path) -> None:
     """The restart is the straight run: on one rank to the last bit, on several to round-off."""
     pytest.importorskip("dolfinx")
@@ -284,6 +286,7 @@ def test_restart_with_another_mass_matrix_is_refused(comm: Any, shared_tmp: Path
     )
 
 
+@pytest.mark.promise("guide/clusters.md", "Results then agree to round-off")
 def test_restart_on_another_number_of_ranks(comm: Any, shared_tmp: Path) -> None:
     """A checkpoint of one rank goes on on all of them, and one of all of them on one: the histories
     agree to 1e-10."""

@@ -119,6 +119,9 @@ def test_bad_step_goes_to_the_next_solver(honest):
         np.testing.assert_allclose(one.new.u, other.new.u, rtol=1e-12, atol=1e-15)
 
 
+@pytest.mark.promise("start/model.md", "accept a step whose certificate is at or below")
+@pytest.mark.promise("start/ten_minutes_form.md", "`simulate` accepts no step above 1e-9")
+@pytest.mark.promise("theory/certificate.md", "A run accepts a step at or below `tolerance`")
 def test_without_escalation_a_bad_step_raises_and_says_where():
     good = list(run(shaken(), HALF, dt=5e-3, steps=60))
     first = next(report.new for report in good if report.new.active[0])

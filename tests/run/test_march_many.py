@@ -85,6 +85,9 @@ def alone(problems, scheme):
         alone([replace(one, friction=vc.Coulomb(0.3)) for one in LIGHT], None),
     ],
 )
+@pytest.mark.promise(
+    "guide/solvers.md", "1e-13 of the largest in 300 steps", bound="1e-12 in each step"
+)
 def test_each_step_is_the_step_alone_from_the_same_state(problems, scheme, steps_together):
     reports, errors = run(problems, scheme=scheme)
     closed = 0.0

@@ -62,6 +62,9 @@ def test_without_contact_it_is_the_midpoint_rule_but_for_the_load() -> None:
 @pytest.mark.parametrize(
     ("given", "courant"), [(thrown, 0.5), (bouncing, 1.0), (period_three, 1.0), (period_three, 0.1)]
 )
+@pytest.mark.promise(
+    "guide/schemes.md", "that the [ledger](../start/model.md#energy-ledger) has no"
+)
 def test_ledger_closes(given: Any, courant: float) -> None:
     """V9.7: defect <= 1e-10 of the largest energy in every step; V9.4: nothing is lost but contact
     work."""

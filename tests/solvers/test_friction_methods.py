@@ -116,6 +116,7 @@ def test_two_dimensions_against_enumeration(method: Any, law: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("d, mu", [(2, 0.3), (2, 0.8), (3, 0.5), (3, 0.8)])
+@pytest.mark.promise("guide/solvers.md", "The methods agree to 1e-9, on random problems")
 def test_methods_agree(d: int, mu: float) -> None:
     """Up to eight nodes, every second number with each coefficient, 1e-9; slip and stick both
     occur; no reaction leaves its cone by more than the last digit."""

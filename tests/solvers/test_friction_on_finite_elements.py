@@ -72,6 +72,7 @@ def reports(
 @pytest.mark.parametrize("friction", [Coulomb(0.3), Tresca(2e3)], ids=repr)
 @pytest.mark.parametrize(("scheme", "mass"), SCHEMES, ids=NAMES)
 @pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.promise("guide/solvers.md", "Points that stick keep their place to the last bit")
 def test_every_step_is_certified(comm: Any, d: int, scheme: Any, mass: Any, friction: Any) -> None:
     """Certificate 1e-9 (V9); reactions in their cones, no slip where the cone has room; slip and
     stick both occur."""

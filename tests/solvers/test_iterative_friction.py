@@ -94,6 +94,7 @@ def test_one_point_by_hand(law: Any, push: float, pull: float) -> None:
 
 @pytest.mark.serial
 @pytest.mark.parametrize("law", [Coulomb(0.5), Tresca(1.0)], ids=repr)
+@pytest.mark.promise("guide/solvers.md", "sticking points are where they were, to the last bit")
 def test_slip_direction_in_space_by_hand(law: Any) -> None:
     """A = diag(4, 1, 3), s = 1: r_t = (cos a, sin a), slip = (r·k) factor: the pull is r_t + K
     slip, K = diag(1, 3)."""

@@ -69,6 +69,7 @@ def test_a_tipped_block(law: Any) -> None:
         "moving",
     ],
 )
+@pytest.mark.promise("guide/solvers.md", "agree with `Condensed()` to 3e-10", bound="1e-9")
 def test_steps_agree_with_the_condensed_route(name: str) -> None:
     make, dt = PROBLEMS[name]
     problem = make()
@@ -111,6 +112,7 @@ def test_statics_agree_with_the_condensed_route(d: int, law: Any) -> None:
     assert surface.some(slips[0]) and np.array_equal(*slips)
 
 
+@pytest.mark.promise("guide/solvers.md", "They stop when the residual is 3e-10")
 def test_newton_steps_are_few_and_reductions_short() -> None:
     """At most 12 Newton steps where contact comes and goes, and no reduction of more than a dozen
     numbers."""

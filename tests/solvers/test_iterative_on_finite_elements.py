@@ -27,6 +27,7 @@ COMM = MPI.COMM_WORLD
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", PROBLEMS)
+@pytest.mark.promise("guide/solvers.md", "agree with `Condensed()` to 3e-10", bound="1e-9")
 def test_steps_agree_with_the_condensed_route(name: str, kind: str) -> None:
     """u and r_n of every step to 1e-9 of their largest values; contact closes, and on most of them
     opens again."""
@@ -100,6 +101,8 @@ def test_ranks_that_overlap_take_hardly_more_iterations_than_one(simplices: bool
     )
 
 
+@pytest.mark.promise("guide/solvers.md", "They stop when the residual is 3e-10")
+@pytest.mark.promise("guide/solvers.md", "Certificates are 2.1e-10 at most", bound="3e-10")
 def test_the_answer_is_taken_as_it_is() -> None:
     """An answer that stopped where it was told to is not corrected: products are those of one solve
     a step."""

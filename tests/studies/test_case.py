@@ -61,6 +61,7 @@ def assert_same(one: Mapping[str, Any], other: Mapping[str, Any]) -> None:
             )
 
 
+@pytest.mark.promise("guide/studies.md", "The numbers are the same to the last bit")
 def test_readmes_first_example_to_the_last_bit() -> None:
     """demos/cases/wall.toml is the code of README, run for 60 of its 400 steps; dt is 1/560 s
     exactly."""

@@ -137,6 +137,7 @@ system = {clamped = ["lower_bottom", "upper_top"]}
 
 @pytest.mark.serial
 @pytest.mark.parametrize("extra", [pytest.param(False, marks=pytest.mark.serial), True])
+@pytest.mark.promise("guide/soil.md", "moved by 1e-12 of the static displacement", bound="1e-11")
 def test_nothing_moves_without_motion(shared_tmp: Path, extra: bool) -> None:
     """V8.9: gravity, perhaps a prop on the roof that then holds it where it is, then the compliant
     base for a second without motion: still to 1e-11 of the settlement."""
@@ -220,6 +221,7 @@ class PowerFailure(Exception):
 
 
 @pytest.mark.serial
+@pytest.mark.promise("guide/stages.md", "the uninterrupted run to the last bit")
 def test_a_run_stopped_within_a_stage_goes_on_to_the_last_bit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

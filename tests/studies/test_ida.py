@@ -104,6 +104,9 @@ def again(folder: Path, **more: object) -> tuple[list[dict[str, object]], list[s
 
 
 @pytest.mark.slow
+@pytest.mark.promise(
+    "guide/studies.md", "There are 84 runs; the worst certificate", bound="1e-9, in four runs"
+)
 def test_the_example_gives_a_tidy_table(example: tuple[Path, str]) -> None:
     """Four rows in order, all certified; intensities and demands are those of record and run."""
     folder, printed = example
@@ -286,6 +289,7 @@ def test_stopping_stops_the_runs(study: Path, monkeypatch: pytest.MonkeyPatch) -
         os.kill(int(going.read_text()), 0)
 
 
+@pytest.mark.promise("guide/studies.md", "The demands agree to 1e-13", bound="1e-10")
 def test_runs_of_a_body_keep_their_own_books(study: Path, tmp_path: Path) -> None:
     """Runs that share a process share the body, and none of their recorders: the ledger of each is
     its own."""

@@ -138,6 +138,7 @@ def test_wall_shares_its_gravity_stage_and_its_matrices_over_records() -> None:
     assert state.r_n.max() > 0.0
 
 
+@pytest.mark.promise("guide/practice.md", "the run has them to nine digits")
 def test_dam_has_the_resultant_of_weight_water_and_uplift(tmp_path: Path) -> None:
     """N = W - U, T = -H and their eccentricity, in closed form; the factor of safety mu N/|T| falls
     below one for a while under the motion, and the dam is then further downstream."""
@@ -156,6 +157,9 @@ def test_dam_has_the_resultant_of_weight_water_and_uplift(tmp_path: Path) -> Non
     assert history["margin_joint"].min() < 1e-9
 
 
+@pytest.mark.promise(
+    "guide/practice.md", "a beam with shear and a rigid deck, to 0.2 %", bound="1 %"
+)
 def test_pier_rocks_within_the_moment_that_overturns_it(tmp_path: Path) -> None:
     """Its weight on the raft; N never acts beyond the edge, so that |M| <= N B/2, as the raft lifts
     off; clamped at its foot and with stiff raft and deck it has the frequency of a beam with shear,
@@ -225,6 +229,9 @@ system = {prescribed = [
 """
 
 
+@pytest.mark.promise(
+    "guide/practice.md", "the run agrees with this to 2 %", bound="8 %, beside the box"
+)
 def test_culvert_racks_with_the_ground(tmp_path: Path) -> None:
     """Under 0.1 g sideways, without time, the free field shears by rho a z/G, and the box by less:
     its frame is stiffer than the soil. Shaken, it carries its weight all the while it accelerates

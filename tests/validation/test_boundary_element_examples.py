@@ -75,6 +75,11 @@ def at(values: Array, *times: float, dt: float = 0.05) -> Array:
 
 
 @pytest.mark.parametrize("law", LAWS)
+@pytest.mark.promise("guide/pressed_blocks.md", "Energies differ by at most 0.5 % of the largest")
+@pytest.mark.promise(
+    "guide/pressed_blocks.md", "below 3e-15, and by the Uzawa iteration", bound="1e-12"
+)
+@pytest.mark.promise("theory/bem.md", "Certificates of the march are below 2e-15", bound="1e-12")
 def test_square_energies(law):
     """V7.1, B9: the table of the independent script to 0.05 %, finite elements on 160 x 160 cells
     to 0.5 % of the largest energy, linear growth before the wave arrives; certified, closed books,
@@ -94,6 +99,7 @@ def test_square_energies(law):
 
 
 @pytest.mark.parametrize("law", LAWS)
+@pytest.mark.promise("guide/pressed_blocks.md", "Impulses differ by 0.03 %", bound="0.05 %")
 def test_square_impulse(law):
     """V7.1, B9: impulse of the contact until t = 4 against finite elements on 160 x 160 cells, 0.05
     %; no penetration; the independent script's impulses."""
@@ -104,6 +110,9 @@ def test_square_impulse(law):
 
 
 @pytest.mark.parametrize("law", LAWS)
+@pytest.mark.promise(
+    "guide/pressed_blocks.md", "The forces of both ways are equal to 3e-7", bound="1e-6"
+)
 def test_uzawa_needs_about_two_hundred_iterations(law):
     """B10: the source's algorithm on all steps at once, 1e-8, against the march: 1e-6; its
     counts."""
@@ -114,6 +123,9 @@ def test_uzawa_needs_about_two_hundred_iterations(law):
 
 @pytest.mark.parametrize(
     ("law", "early", "late"), [("none", 0.0, 0.0), ("tresca", 0.2, 0.25), ("coulomb", 0.05, 0.25)]
+)
+@pytest.mark.promise(
+    "guide/pressed_blocks.md", "Pressures agree within 3 %", bound="5 %, on 40 cells"
 )
 def test_square_tractions_beside_finite_elements(law, early, late):
     """V7.1: tractions on the whole contact boundary, means over 0.2 s, against 40 x 40 cells:
@@ -227,6 +239,7 @@ def test_concrete_in_concrete():
     assert (np.diff(found.friction_loss) >= -1e-9).all()
 
 
+@pytest.mark.promise("guide/pressed_blocks.md", "its energy is constant to round-off")
 def test_tennis_ball():
     """V7.3, B8: 40 elements, gentle push: released at 2.7, then no force, energy constant to
     round-off; momentum is the slope of the mean displacement; the plane's work is the energy;

@@ -61,6 +61,10 @@ def test_v4_2_same_as_an_independent_program():
 
 
 @pytest.mark.parametrize("contact", ["sliding", "rubbing", "bilateral"])
+@pytest.mark.promise("guide/channel.md", "is certified to 1e-12", bound="1e-9, in a shorter run")
+@pytest.mark.promise(
+    "guide/channel.md", "the ledgers close to 6e-13", bound="1e-10, in a shorter run"
+)
 def test_v4_2_certificates_and_ledger(contact):
     """V9.7: every step to 1e-9, ledger to 1e-10; the step and the M-orthogonal impact rule create
     no energy (V9.1, V9.6)."""
@@ -78,6 +82,7 @@ def test_v4_2_certificates_and_ledger(contact):
 
 
 @pytest.mark.parametrize("friction", [None, FRICTION], ids=["sliding", "rubbing"])
+@pytest.mark.promise("guide/solvers.md", "both routes agree in each step to 1e-9")
 def test_v4_2_both_routes(friction):
     """The volume route, which shares A and b only, gives the same step from the same state, to
     1e-9."""
@@ -94,6 +99,7 @@ def test_v4_2_both_routes(friction):
 # --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.promise("guide/channel.md", "both feet in 5.5 %", bound="5 % and 2 %")
 def test_fig_7_openings():
     """Channel minus soil along the outward normal: never negative, on both walls in turn. The two
     tops are open together in less than 5 % of the steps (found: 4 %), both whole walls in 1 %."""
@@ -128,6 +134,9 @@ def test_fig_8_rocking():
 
 
 @pytest.mark.parametrize("contact", ["sliding", "rubbing"])
+@pytest.mark.promise(
+    "guide/channel.md", "to 1e-12 in the first 200 steps", bound="8 times the run's round-off"
+)
 def test_mirror_symmetry(contact):
     """-a_g: u_y(1) <-> u_y(7) and u_x -> -u_x to the run's round-off, that a change of the shaking
     by a last digit shows: 1e-12 of the largest displacement. Mirrored runs differ by 0.4 to 2 times
@@ -198,6 +207,7 @@ VERTICAL = vc.Harmonic(1.0, 3.0, direction=(0.0, 1.0))
     [(None, CHANNEL.harmonic()), (FRICTION, (CHANNEL.harmonic(), VERTICAL))],
     ids=["sliding", "rubbing, vertical motion too"],
 )
+@pytest.mark.promise("guide/channel.md", "60 steps: to 6e-11 of the largest", bound="1e-8")
 def test_frame_invariance(friction, excitation):
     """An inertia load in the frame of the bedrock and a moved bedrock: the same contact forces, to
     1e-8."""
@@ -212,6 +222,7 @@ def test_frame_invariance(friction, excitation):
 
 
 @pytest.mark.parametrize("friction", [None, FRICTION], ids=["sliding", "rubbing"])
+@pytest.mark.promise("guide/soil.md", "moved by 1e-12 of the static displacement", bound="4.6e-12")
 def test_one_quiet_second_after_gravity(friction):
     """Nothing moves by more than rounding moves the static solution: 2.2e-16 times the condition
     number of the stiffness, 1.0e4 scaled by its diagonal and without rigid motions, is 2.3e-12 of

@@ -107,6 +107,9 @@ def test_pressed_walls_are_held_ones_and_open_walls_are_told():
 
 
 @pytest.mark.parametrize(("f", "ratio"), [(0.5, 0.943), (2.0, 0.926), (5.0, 1.145)])
+@pytest.mark.promise(
+    "guide/checks.md", "Veletsos and Younan is up to 7 % too high", bound="ratios to 2 %"
+)
 def test_veletsos_and_younan_beside_finite_elements(f: float, ratio: float):
     """A long layer, 12 cells over H, steady harmonics at 0.13, 0.53 and 1.33 of its lowest
     frequency: what leaving vertical stresses out costs. At 0.5 Hz Wood's is met within 2 % (0.9 %),

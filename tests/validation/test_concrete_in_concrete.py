@@ -69,6 +69,7 @@ def slowly(law: str, scheme: Any) -> Solution:
 
 
 @cases
+@pytest.mark.promise("guide/pressed_blocks.md", "The energy ledger closes to 1e-13", bound="1e-10")
 def test_certificates_and_ledger(law, scheme):
     """V9.7: every step certified to 1e-9, the ledger closed to 1e-10; what is put in is more than
     what is stored by what friction takes."""
@@ -95,6 +96,7 @@ def per_body(problem: ContactProblem, load: Array) -> Array:
 
 
 @cases
+@pytest.mark.promise("guide/pressed_blocks.md", "The impulse on the box is minus")
 def test_action_is_reaction(law, scheme):
     """V7.3, V9.8: what the box gains in momentum beyond the impulse of the pressure, the block
     loses beyond the impulse of its base, to 1e-12; without friction it is the sum of the reactions
@@ -173,6 +175,7 @@ def in_order(system: Any, n: int) -> Any:
 
 
 @laws
+@pytest.mark.promise("guide/pressed_blocks.md", "Welded parts move like a block of one grid")
 def test_a_welded_interface_is_none(law):
     """V7.3: on the block of five welded sub-meshes and on the block of one grid the motion and the
     reactions are the same, to 1e-10."""
@@ -234,6 +237,10 @@ def test_friction_takes_energy():
 
 
 @pytest.mark.parametrize(("law", "tolerance"), [("smooth", 5e-3), ("rough", 0.02)])
+@pytest.mark.promise(
+    "guide/pressed_blocks.md", "put on in four static steps, to 0.4 %", bound="0.5 %"
+)
+@pytest.mark.promise("guide/pressed_blocks.md", "With friction it is so to 2 %")
 def test_slow_limit(law, tolerance):
     """The energy at 20 ms is that of the same load put on without inertia, and the load is in
     equilibrium there."""

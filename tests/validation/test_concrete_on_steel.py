@@ -46,6 +46,9 @@ def pressed(box: Square, law: str, scheme: Any, *, dt: float, t_end: float) -> M
 @pytest.mark.serial
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("scheme", [vc.Midpoint(), None])
+@pytest.mark.promise("guide/pressed_blocks.md", "All five digits of REF")
+@pytest.mark.promise("guide/pressed_blocks.md", "the energy is f²/(2E') to 0.02 %", bound="0.1 %")
+@pytest.mark.promise("guide/pressed_blocks.md", "½ nu (1 + nu) f/E to 0.03 %", bound="0.1 %")
 def test_energies(scheme, law):
     """V7.2, 20 x 20 cells, dt = 0.05 ms: energies to all five digits with the midpoint rule, to
     1e-4 with the default scheme; on steel the base sticks everywhere."""

@@ -16,6 +16,7 @@ from demos.parts.problems.wall import CASES, Wall, build
 
 
 @pytest.mark.serial
+@pytest.mark.promise("start/first_wall.md", "is the answer of the step to round-off")
 def test_loads_and_reactions_add_up_to_the_step(comm: Any, shared_tmp: Path) -> None:
     """Step 30 of case b presses most: u = u_1 + u_2 at every node; only u_2 knows reactions, and
     u_1 goes too far."""

@@ -96,6 +96,7 @@ LAST_DIGIT = {"energy": 1e-5, "loss_friction": 1e-5, "u_y_top": 1e-4, "u_x_corne
 @pytest.mark.parametrize(
     "law", [pytest.param(law, marks=() if law == "coulomb" else one_rank) for law in RUBBING]
 )
+@pytest.mark.promise("guide/pressed_blocks.md", "**every printed digit of REF is reproduced**")
 def test_midpoint_on_the_reference_mesh(law):
     """V7.1, 20 x 20 cells, consistent mass: energies, work of friction, displacements and the mean
     force of the steps between t = 1.2 and 1.8 to every printed digit."""
@@ -110,6 +111,7 @@ def test_midpoint_on_the_reference_mesh(law):
 
 @one_rank
 @pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.promise("guide/pressed_blocks.md", "with and without friction, to round-off")
 def test_the_wave_takes_in_energy_at_a_constant_rate(scheme):
     """V7.1: E = p² L/(rho c_P) t + 1.4e-3 t² until the wave is at the support, t = 1, to 1 % of
     E(1); until then it does not matter whether and how the support rubs."""
@@ -156,6 +158,7 @@ def test_confined_square(scheme):
 @pytest.mark.parametrize(
     ("scheme", "law"), [("midpoint", "none"), ("default", "none"), ("default", "coulomb")]
 )
+@pytest.mark.promise("guide/pressed_blocks.md", "These differences fall with order 1")
 def test_energies_converge_with_the_mesh(scheme, law):
     """V7.1: the mean square over time of E_N - E_2N, N = 10, 20, halves with h: order 1 +- 0.3, as
     a front has it."""

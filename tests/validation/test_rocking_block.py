@@ -87,6 +87,9 @@ def first_impact(model: rocking.RockingModel, theta0: float) -> float:
 
 
 @pytest.mark.serial
+@pytest.mark.promise(
+    "guide/rocking_block.md", "The certificate of the worst step is 1.2e-13", bound="1e-9"
+)
 def test_free_rocking(model):
     """V3.1: impact times within 2 %, amplitudes and restitution within 5 %; the rigid limit to 0.3,
     0.5 and 0.5 %. Every step is certified to 1e-9, and each impact takes 1 - e² of the energy to 2
@@ -130,6 +133,9 @@ def test_period_at_housners_angle(model, share):
     assert 4.0 * first_impact(model, share * SHAPE.alpha) == pytest.approx(PERIODS[share], rel=0.02)
 
 
+@pytest.mark.promise(
+    "guide/rocking_block.md", "tends to the rigid one like 1/E", bound="1e-3, falling like 1/E"
+)
 def test_stiffness(model):
     """V3.1: E -> infinity. The time of the first impact tends to the rigid limit like 1/E."""
     theta0 = 0.5 * SHAPE.alpha
@@ -154,6 +160,8 @@ def test_time_step(model):
     assert errors[1] < 0.1 * errors[0]
 
 
+@pytest.mark.promise("guide/rocking_block.md", "This is the round-off of the strain energy")
+@pytest.mark.promise("guide/rocking_block.md", "closes to 3e-7 J", bound="six times as much")
 def test_ledger(model):
     """V9.7 for V3.1: the ledger closes to 1e-11 of the largest energy and the round-off of uᵀKu.
 
@@ -185,6 +193,8 @@ def lifted(model: rocking.RockingModel, peak: float) -> tuple[float, float, floa
     return gap, least, angle
 
 
+@pytest.mark.promise("guide/rocking_block.md", "The condition holds to 0.2 %")
+@pytest.mark.promise("guide/rocking_block.md", "lifts one when its peak is 1 % above")
 def test_onset(model):
     """V3.1: rocking starts at g b/h = 1.962 m/s²: 1 % less lifts nothing, 1 % more does. The mesh's
     own criterion, the moment of its inertia load, holds to 0.2 %."""

@@ -71,6 +71,7 @@ def timing(name: str) -> tuple[float, int]:
 
 @pytest.mark.slow
 @many_routes
+@pytest.mark.promise("guide/solvers.md", "both routes agree in each step to 1e-9")
 def test_all_routes_agree_at_every_step(name):
     """Every method against the active set on the condensed problem, from the same states: u and r_n
     to 1e-9.

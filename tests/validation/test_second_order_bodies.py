@@ -179,8 +179,8 @@ def test_v2_3_cylinder_of_curved_cells(simplices: bool) -> None:
     assert abs(coarse["peak"]) < 3e-3 and abs(fine["peak"]) < 2e-3
 
 
-def cook(n: int, degree: int, simplices: bool) -> float:
-    """How deep the middle of the loaded side is, upwards."""
+def cooks_body(n: int, degree: int, simplices: bool) -> tuple[Any, Any]:
+    """The body and its named groups."""
 
     def placed(x: Array) -> Array:
         return np.column_stack([48.0 * x[:, 0], 44.0 * x[:, 0] + x[:, 1] * (44.0 - 28.0 * x[:, 0])])
@@ -196,6 +196,12 @@ def cook(n: int, degree: int, simplices: bool) -> float:
         clamped=tags["left"],
         loads=fem.Traction(tags["right"], (0.0, 1.0 / 16.0)),
     )
+    return system, tags
+
+
+def cook(n: int, degree: int, simplices: bool) -> float:
+    """How deep the middle of the loaded side is, upwards."""
+    system, _ = cooks_body(n, degree, simplices)
     state = vc.static_equilibrium(linear(system))
     middle = system.space.find_nodes(np.array([[48.0, 52.0]]))
     return float(system.space.sample(state.u, middle, 0.0)[0, 1])
@@ -207,6 +213,25 @@ def test_cooks_membrane() -> None:
     still 2.9 %)."""
     p2, q2, q1 = cook(8, 2, True), cook(8, 2, False), cook(16, 1, False)
     assert 23.96 * 0.993 < p2 < 23.97 and 23.96 * 0.997 < q2 < 23.97 and q1 < 23.96 * 0.985
+
+
+@pytest.mark.serial
+@pytest.mark.promise("guide/second_order.md", "(free deflection - gap) / (deflection under a unit")
+@pytest.mark.parametrize("degree, simplices", [(1, False), (2, True), (2, False)])
+def test_a_stop_at_the_corner_of_cooks_membrane(degree: int, simplices: bool) -> None:
+    """The force is (free deflection - gap) / (deflection under a unit force), by the matrix K."""
+    system, tags = cooks_body(8, degree, simplices)
+    gap = 5.0
+    stop = vc.HalfSpace(point=(0.0, 60.0 + gap), normal=(0.0, -1.0))
+    surface = fem.contact_surface(system, tags["top"], obstacle=stop, points=[(48.0, 60.0)])
+    problem = vc.ContactProblem(system, surface)
+    state = vc.static_equilibrium(problem, solver=vc.Condensed())
+    equations = problem.equations
+    (corner,) = surface.owned
+    units = np.eye(len(state.u))
+    K = np.column_stack([equations.K @ one for one in units])
+    free, unit = np.linalg.solve(K, np.column_stack([equations.load(0.0), units[corner]]))[corner]
+    assert free > gap and state.r_n == pytest.approx([(free - gap) / unit], rel=1e-9)
 
 
 BARS = {

@@ -72,6 +72,7 @@ CASES = {
 
 @one_rank
 @pytest.mark.parametrize("case", CASES)
+@pytest.mark.promise("start/first_wall.md", "All digits are tested against")
 def test_v4_1_displacements(case):
     """u12 at six steps, minima and maxima of u12, u6, u7, u26 [1e-6 m]; a printed 0 is exactly
     0."""
@@ -133,6 +134,7 @@ LEDGERS = {
 
 @one_rank
 @pytest.mark.parametrize("case", LEDGERS)
+@pytest.mark.promise("start/model.md", "defect stays at rounding")
 def test_v4_1_energy_ledger(case):
     """Input work = reset loss + contact work of the steps + energy at the end [J], closed to
     round-off (V9.7)."""
@@ -322,6 +324,7 @@ def test_statement_6_positive_homogeneity(case):
 
 
 @one_rank
+@pytest.mark.promise("start/first_wall.md", "a tenth of the density gives exactly")
 def test_density_read_as_a_tenth_only_scales():
     """rho = 0.24 instead of 2.4 kN s²/m⁴ with f = f1/2 and dt = 1/(40 f): every displacement is
     exactly a tenth."""
@@ -344,6 +347,7 @@ OTHER = {
 @one_rank
 @pytest.mark.parametrize("other", OTHER)
 @pytest.mark.parametrize("case", ["free", "b"])
+@pytest.mark.promise("start/first_wall.md", "and `b` by less than 10 %")
 def test_other_discretisations(case, other):
     """Minima and maxima within 10 % of the largest displacement of each point."""
     found, base = history(case, wall=OTHER[other]).u, history(case).u

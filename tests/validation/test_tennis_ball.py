@@ -72,6 +72,9 @@ def run(law: str, scheme: str, push: Push = PUSH, size: float = 0.04) -> dict[st
 
 
 @every_run
+@pytest.mark.promise(
+    "guide/pressed_blocks.md", "velocity of the centre of mass are constant to 1e-11", bound="1e-10"
+)
 def test_flight(scheme, law):
     """V7.3: once released, while the plane retracts, the contact force is 0 and stays 0; velocity
     of the centre of mass and energy are constant to 1e-10. Coulomb's friction is 0 as well;
@@ -90,6 +93,14 @@ def test_flight(scheme, law):
 
 @pytest.mark.serial
 @every_run
+@pytest.mark.promise("guide/pressed_blocks.md", "The momentum equals the impulse", bound="1e-10")
+@pytest.mark.promise("guide/pressed_blocks.md", "There is no momentum sideways", bound="1e-10")
+@pytest.mark.promise("guide/pressed_blocks.md", "The ledger closes to 1e-11", bound="1e-10")
+@pytest.mark.promise(
+    "guide/pressed_blocks.md",
+    "symmetric loads give symmetric motions",
+    bound="1e-10, by what moves sideways",
+)
 def test_momentum_and_energy_have_their_sources(scheme, law):
     """V7.3: momentum is the impulse of the contact forces, to 1e-10; none sideways, none angular.
     The energy is the work of the moving plane, Σ force (s1 - s0), less what contact and friction

@@ -41,6 +41,7 @@ BENT = 0.2  # [1/m]: curvature of the curved faces
         "curved-apart",
     ],
 )
+@pytest.mark.promise("README.md", "that closes to rounding")
 def test_a_whole_collision(scheme, bent, gap, friction, simplices):
     """Momentum, angular momentum and the ledger to 1e-11 of the largest. Rough curved faces are
     polygons that do not fit, and friction acts on both sides of the gaps between them: its moment

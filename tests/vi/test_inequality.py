@@ -104,6 +104,7 @@ def test_convection_by_the_semismooth_method(comm: Any) -> None:
 
 
 @pytest.mark.parametrize("method", METHODS, ids=name_of)
+@pytest.mark.promise("guide/bounds.md", "each is at most 1e-9")
 def test_no_load_but_what_rounding_leaves_of_it(comm: Any, method: Any) -> None:
     """A field that is held at 1 along a line and pushed by nothing, as the crack of demos/crack.py
     that is alone: from guesses with noise, for which J u - F(u) is round-off and tells no size of
