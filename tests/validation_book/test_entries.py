@@ -9,9 +9,10 @@ from dataclasses import replace
 import pytest
 from book_entries import shared_records
 
-from vi_contact.validation import entry_names, judge_mutant, read_entry, run_entry
+from vi_contact.validation import entry_names, read_entry, run_entry
 from vi_contact.validation.entry import RECORDS, Missing
 from vi_contact.validation.results import find_moved, read_results
+from vi_contact.validation.runner import judge_mutant
 
 pytestmark = [pytest.mark.serial, pytest.mark.slow]
 NAMES = entry_names()

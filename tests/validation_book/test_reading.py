@@ -11,10 +11,13 @@ from book_entries import HEADER, ROWS, RUN, TOML, checksum, small_entry
 
 from vi_contact.core.errors import InputError
 from vi_contact.practice.cli.entry import main
-from vi_contact.validation import agreement, judge_mutant, read_data, read_entry, run_entry
+from vi_contact.validation import read_entry, run_entry
+from vi_contact.validation.data import read_data
 from vi_contact.validation.entry import RECORDS
 from vi_contact.validation.report import write_report
 from vi_contact.validation.results import find_moved, rows_of
+from vi_contact.validation.runner import judge_mutant
+from vi_contact.validation.statistics import agreement
 
 pytestmark = pytest.mark.serial
 

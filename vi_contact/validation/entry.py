@@ -25,7 +25,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from ..core.checks import quote
+from ..core.arguments import check_arguments
+from ..core.checks import instance, optional, quote, several
 from ..core.errors import InputError
 from ..core.own_files import read_bytes
 from .data import Data, Row, read_data
@@ -81,7 +82,21 @@ class Inputs(dict[str, Any]):
     def __init__(
         self, values: Mapping[str, Any], rows: Sequence[Row] = (), records: Path | None = None
     ) -> None:
-        super().__init__(values)
+        """Copy the values.
+
+        Args:
+            values: name -> value.
+            rows: as the attribute.
+            records: as the attribute.
+
+        Raises:
+            InputError: an argument is of another type.
+        """
+        remedy = "give what entry.toml has under [inputs], name -> value"
+        super().__init__(instance("Inputs", "values", values, Mapping, remedy))
+        for row in several("Inputs", "rows", rows, "give the rows of data.csv"):
+            instance("Inputs", "a row", row, Mapping, "give the rows of data.csv")
+        optional(instance, "Inputs", "records", records, Path, "give Path('the folder')")
         self.rows = rows
         self.records = records
 
@@ -219,6 +234,7 @@ class Entry:
         return load_run(self.folder)
 
 
+@check_arguments
 def entry_names(folder: str | Path = ENTRIES) -> list[str]:
     """Return the names of the entries in a folder, those of the package by default."""
     return sorted(path.parent.name for path in Path(folder).glob("*/entry.toml"))
@@ -236,6 +252,7 @@ def find_entry(name: str | Path) -> Path:
     return folder
 
 
+@check_arguments
 def read_entry(name: str | Path) -> Entry:
     """Read an entry: that of a name of the package, or that in a folder.
 

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.arguments import check_arguments
 from ..core.checks import check_word, explain_error, quote
 from ..core.errors import InputError, ViContactError
 from .entry import RUN, SETTINGS, Entry, Missing, Mutant, Wanted, read_entry, refuse_units
@@ -72,7 +73,7 @@ class Outcome:
         judgements: of figures and statistics.
         agreements: series -> how well it agrees.
         told: name -> what is told and not judged.
-        seconds: of the wall clock.
+        seconds: of the processor, on this rank.
         found: what run.py returned; None where it returned nothing.
         entry: None where it could not be read.
         error: what the run raised, None if it came to its end.
@@ -96,6 +97,7 @@ class Outcome:
         return [one.name for one in self.judgements if not one.counted and not one.within]
 
 
+@check_arguments
 def run_entry(
     name: str | Path, *, setting: str = "coarse", change: Mapping[str, Any] | None = None
 ) -> Outcome:
@@ -123,7 +125,7 @@ def run_entry(
     except InputError as error:
         return Outcome(short, setting, FAIL, [str(error)])
 
-    began = time.perf_counter()
+    began = time.process_time()
     try:
         found = entry.run.figures(inputs, setting)
         if not isinstance(found, Found):
@@ -135,11 +137,11 @@ def run_entry(
             setting,
             FAIL,
             [f"{ended}: {explain_error('run.py', error)}"],
-            seconds=time.perf_counter() - began,
+            seconds=time.process_time() - began,
             entry=entry,
             error=error,
         )
-    return judge(entry, setting, found, time.perf_counter() - began)
+    return judge(entry, setting, found, time.process_time() - began)
 
 
 def judge(entry: Entry, setting: str, found: Found, seconds: float) -> Outcome:
