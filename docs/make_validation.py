@@ -47,7 +47,8 @@ The page is written by `docs/make_validation.py` from the files in `vi_contact/v
 entry is a folder there: `data.csv` has the numbers of the source with licence and uncertainty,
 `entry.toml` the inputs, limits and reasons, and `run.py` the computation. Coarse and fine are the
 two settings of which this page has the results; sizes of cells and steps of both stand near the
-head of `run.py`. In blocks both settings compute the same. Nobody needs this page to repeat it:
+head of `run.py`, and those of dams_by_hand in that of dam. In blocks both settings compute the
+same. Nobody needs this page to repeat it:
 
     vi-contact validate                  # all entries at the coarse setting, in a few minutes
     vi-contact validate wedge --fine     # one of them with finer meshes and shorter steps
