@@ -32,6 +32,8 @@ def test_stored_results_are_within_today_s_limits(name: str, setting: str) -> No
     for one in entry.list_wanted(setting):
         row = stored[one.name]
         assert (row["wanted"], row["limit"]) == pytest.approx((one.value, one.limit), rel=1e-12)
+        assert row["reason"] == one.reason
+        assert one.series or (row["verdict"] == "known difference") == one.known
         assert one.series or abs(row["found"] - one.value) <= one.limit
     for statistic in entry.statistics:
         assert abs(stored[statistic.name]["found"] - statistic.value) <= statistic.limit

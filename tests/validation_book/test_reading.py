@@ -14,7 +14,7 @@ from vi_contact.practice.cli.entry import main
 from vi_contact.validation import read_entry, run_entry
 from vi_contact.validation.data import read_data
 from vi_contact.validation.entry import RECORDS
-from vi_contact.validation.report import write_report
+from vi_contact.validation.report import describe, figure_rows, write_report
 from vi_contact.validation.results import find_moved, rows_of
 from vi_contact.validation.runner import judge_mutant
 from vi_contact.validation.statistics import agreement
@@ -27,6 +27,18 @@ def test_an_entry_passes(tmp_path: Path) -> None:
     assert outcome.status == "pass" and outcome.why == []
     assert [one.name for one in outcome.judgements] == ["y at 1 m, here", "y at 2 m, there"]
     assert [one.error for one in outcome.judgements] == [0.0, 0.0]
+
+
+def test_a_known_difference_is_no_agreement_and_fails_when_it_grows(tmp_path: Path) -> None:
+    toml = TOML.replace('reason = "Rounding."', 'reason = "Rounding."\nknown = true')
+    outcome = run_entry(small_entry(tmp_path / "line", toml=toml))
+    assert outcome.status == "pass"
+    assert {row["verdict"] for row in rows_of(outcome)} == {"known difference"}
+    assert {row[-1] for row in figure_rows(outcome)} == {"known difference"}
+    assert "known difference  y at 1 m" in describe(outcome)
+    grown = run_entry(small_entry(tmp_path / "grown", toml=toml, rows=ROWS.replace("20", "21.01")))
+    assert grown.status == "fail" and grown.failed == ["y at 2 m, there"]
+    assert [row["verdict"] for row in rows_of(grown)] == ["known difference", "fail"]
 
 
 def test_a_run_sees_no_value_that_it_is_compared_with(tmp_path: Path) -> None:
@@ -103,6 +115,7 @@ def test_line_ends_of_another_system_are_no_change(tmp_path: Path) -> None:
         ('title = "A line"', 'titel = "A line"', "'titel', which nothing reads"),
         ('is_not = ["It is no measurement."]', "", "has no is_not"),
         ('reason = "Rounding."', 'reason = "R."\nlimits = 1', "has 'limits', which nothing reads"),
+        ('reason = "Rounding."', 'reason = "R."\nknown = 1', "known is 1: give true or false"),
     ],
 )
 def test_an_entry_that_does_not_fit_fails(

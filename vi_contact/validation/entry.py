@@ -6,7 +6,8 @@
     [records]       file -> sha256, of records that stand where VI_CONTACT_RECORDS says
     [inputs.NAME]   value, unit, kind (measured, given or CHOSEN), source
     [rows]          setting -> which rows of data.csv it computes; all where it is not named
-    [[figure]]      name, unit, limit, reason, and wanted, or column and where of data.csv
+    [[figure]]      name, unit, limit, reason, and wanted, or column and where of data.csv;
+                    known = true: a known difference, which its limit keeps from growing
     [[statistic]]   of which series of figures, what, wanted, limit, reason
     [[told]]        name, unit, reason: what is told and not judged
     [[mutant]]      name, change of inputs, red: the figures that must fail then, or "the run"
@@ -34,7 +35,13 @@ from .statistics import QUANTITIES
 
 ENTRIES = Path(__file__).resolve().parent / "entries"
 RECORDS = "VI_CONTACT_RECORDS"  # the environment variable that names the folder of records
-KINDS = {"E": "measured", "B": "published by a program or a benchmark", "T": "textbook"}
+KINDS = {
+    "E": "measured",
+    "B": "published by a program or a benchmark",
+    "T": "textbook",
+    "C": "closed form",
+    "H": "calculated by hand for this book",
+}
 ORIGINS = ("measured", "given", "CHOSEN")
 SETTINGS = ("smallest", "coarse", "fine")
 RUN = "the run"  # among what a mutant turns red: it ends in an error
@@ -43,7 +50,7 @@ _TABLES = ("data", "records", "inputs", "rows", "figure", "statistic", "told", "
 _WORDS = ("title", "kind", "about", "model", "is_not")
 _FIGURE = (
     "name", "unit", "wanted", "column", "where", "limit", "relative", "floor", "up_to", "reason",
-    "series", "at",
+    "series", "at", "known",
 )  # fmt: skip
 
 
@@ -114,6 +121,7 @@ class Wanted:
         series: the series that it counts in; "" for a figure that is judged by itself.
         group: the series, or the name with its {columns} of the table that it is one of; "" for
             a figure that stands alone.
+        known: whether it is known to differ: within its limit it does not agree either.
     """
 
     name: str
@@ -123,6 +131,7 @@ class Wanted:
     reason: str
     series: str = ""
     group: str = ""
+    known: bool = False
 
 
 @dataclass(frozen=True)
@@ -163,7 +172,7 @@ class Entry:
         name: that of its folder.
         folder: where it stands.
         title: one line.
-        kind: "E", "B" or "T", a key of ``KINDS``.
+        kind: a key of ``KINDS``.
         about: what is compared, one or two sentences.
         model: how it is computed, sentence by sentence.
         is_not: what the result is not, sentence by sentence.
@@ -399,11 +408,14 @@ def _expand_figure(entry: Entry, table: Mapping[str, Any], rows: Sequence[Row]) 
     name = _text(table, "name", owner)
     unit = _text(table, "unit", owner)
     reason = _text(table, "reason", owner)
+    known = table.get("known", False)
+    if not isinstance(known, bool):
+        raise InputError(f"{owner}: known is {quote(known)}: give true or false")
     if ("wanted" in table) == ("column" in table):
         raise InputError(f"{owner}: give wanted, or a column of data.csv, and not both")
     if "wanted" in table:
         value = _number(table, "wanted", owner)
-        yield Wanted(name, unit, value, _limit(table, value, owner), reason)
+        yield Wanted(name, unit, value, _limit(table, value, owner), reason, known=known)
         return
 
     column = table["column"]
@@ -426,6 +438,7 @@ def _expand_figure(entry: Entry, table: Mapping[str, Any], rows: Sequence[Row]) 
                 reason,
                 series=table.get("series", ""),
                 group=table.get("series", name),
+                known=known,
             )
 
 

@@ -8,7 +8,7 @@ from ..practice.plots.pages import write_pages
 from ..practice.plots.sections import Section, Table, format_number
 from .entry import KINDS, Entry
 from .results import write_results
-from .runner import SKIP, Outcome
+from .runner import FAIL, SKIP, Outcome
 from .statistics import QUANTITIES, Agreement
 
 HEADER = ("figure", "unit", "found", "wanted", "error", "limit", "verdict")
@@ -58,7 +58,7 @@ def _sum_up(outcomes: Sequence[Outcome]) -> Section:
     rows = []
     for outcome in outcomes:
         found = outcome.found
-        judged = [one for one in outcome.judgements if not one.counted]
+        judged = [one for one in outcome.judgements if not one.counted and not one.known]
         within = sum(one.within for one in judged)
         rows.append(
             (
@@ -110,9 +110,7 @@ def figure_rows(outcome: Outcome) -> list[tuple[str, ...]]:
     """Return the texts of all figures of an outcome, under ``HEADER``."""
     rows = []
     for one in outcome.judgements:
-        verdict = "pass" if one.within else "FAIL"
-        if one.counted:
-            verdict = "within" if one.within else "outside"
+        verdict = one.verdict.replace(FAIL, "FAIL")
         values = (one.found, one.wanted, one.error, one.limit)
         rows.append((one.name, one.unit, *(f"{value:.6g}" for value in values), verdict))
     units = {} if outcome.entry is None else {one.name: one.unit for one in outcome.entry.told}
@@ -169,7 +167,7 @@ def describe(outcome: Outcome) -> str:
         if one.reason != reason:
             reason = one.reason
             lines.append(f"    limit: {reason}")
-        verdict = "pass" if one.within else "FAIL"
+        verdict = one.verdict.replace(FAIL, "FAIL")
         unit = "" if one.unit == "-" else f" {one.unit}"
         lines.append(
             f"  {verdict}  {one.name}: found {one.found:.6g}, wanted {one.wanted:.6g}, error "

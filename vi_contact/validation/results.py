@@ -55,9 +55,6 @@ def rows_of(outcome: Outcome) -> list[dict[str, Any]]:
         return [common | {"verdict": outcome.status, "reason": " ".join(outcome.why)}]
     rows = []
     for one in outcome.judgements:
-        verdict = "pass" if one.within else "fail"
-        if one.counted:
-            verdict = "within" if one.within else "outside"
         rows.append(
             common
             | {
@@ -67,7 +64,7 @@ def rows_of(outcome: Outcome) -> list[dict[str, Any]]:
                 "wanted": one.wanted,
                 "error": one.error,
                 "limit": one.limit,
-                "verdict": verdict,
+                "verdict": one.verdict,
                 "reason": one.reason,
             }
         )

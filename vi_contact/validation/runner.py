@@ -25,6 +25,7 @@ from .statistics import QUANTITIES, Agreement, agreement
 PASS = "pass"
 FAIL = "fail"
 SKIP = "skip"
+KNOWN = "known difference"  # within its limit, and no agreement
 MANY = 5  # more values of one kind than these are told as a line of found over wanted too
 
 
@@ -40,6 +41,7 @@ class Judgement:
         limit: largest |found - wanted|.
         reason: of the limit.
         counted: whether it is judged in a series only, by its statistics.
+        known: whether it is known to differ, so that it is no agreement within its limit either.
     """
 
     name: str
@@ -49,6 +51,7 @@ class Judgement:
     limit: float
     reason: str
     counted: bool = False
+    known: bool = False
 
     @property
     def error(self) -> float:
@@ -59,6 +62,15 @@ class Judgement:
     def within(self) -> bool:
         """Say whether the figure is within its limit; NaN never is."""
         return abs(self.error) <= self.limit
+
+    @property
+    def verdict(self) -> str:
+        """Return "pass", "known difference" or "fail"; of a series "within" or "outside"."""
+        if self.counted:
+            return "within" if self.within else "outside"
+        if not self.within:
+            return FAIL
+        return KNOWN if self.known else PASS
 
 
 @dataclass(frozen=True)
@@ -205,6 +217,7 @@ def _judge_figure(wanted: Wanted, found: Found) -> Judgement:
         wanted.limit,
         wanted.reason,
         counted=bool(wanted.series),
+        known=wanted.known,
     )
 
 
