@@ -182,7 +182,10 @@ class RigidBody:
 
 def rotation(p: Array) -> Array:
     """Return R (3, 3) of the quaternion p (4,), which need not have length one."""
-    p = array("rotation", "p", p, (4,))
+    array("rotation", "p", p, (4,))
+    # As it lies in memory, and not the copy of the check: a copy is rounded in another order, which
+    # a body that strikes again and again makes visible.
+    p = np.asarray(p, dtype=float)
     w, x, y, z = p / np.linalg.norm(p)
     return np.array(
         [
