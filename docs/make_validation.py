@@ -143,8 +143,12 @@ def section(entry: Entry, stored: dict[str, Rows]) -> Iterator[str]:
     yield f"Kind of the numbers: {KINDS[entry.kind]}.\n"
     folder = f"../../vi_contact/validation/entries/{entry.name}"
     files = sorted(path.name for path in entry.folder.iterdir() if path.suffix in SHOWN)
-    links = ", ".join(f"[{name}]({folder}/{name})" for name in files if name != "__init__.py")
-    yield f"Files of the entry: {links}.\n"
+    files.remove("__init__.py")
+    # The site takes a link to a page for one of its own: of texts it names the file alone.
+    links = [
+        f"`{name}`" if name.endswith(".md") else f"[{name}]({folder}/{name})" for name in files
+    ]
+    yield f"Files of the entry: {', '.join(links)}.\n"
     about = [(key, entry.data.about[key]) for key in NEEDED]
     yield from table(("data.csv", ""), about)
     yield "How it is computed:\n"
