@@ -22,7 +22,14 @@ from vi_contact.validation.data import NEEDED
 from vi_contact.validation.entry import KINDS, RECORDS, SETTINGS
 from vi_contact.validation.report import draw_outcome, input_rows
 from vi_contact.validation.results import RESULTS, read_results, rows_of, write_rows
-from vi_contact.validation.runner import FAIL, KNOWN, PASS, compare_groups
+from vi_contact.validation.runner import (
+    FAIL,
+    KNOWN,
+    PASS,
+    compare_groups,
+    count_within,
+    group_by_reason,
+)
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "reference" / "validation.md"
@@ -119,11 +126,11 @@ def overview(entries: Sequence[Entry], stored: dict[str, Rows]) -> Iterator[str]
         cells = [f"[{entry.name}](#{entry.name.replace('_', '-')})", KINDS[entry.kind], entry.title]
         for setting in ("coarse", "fine"):
             own = [row for row in stored[setting] if row["entry"] == entry.name]
-            judged = [row for row in own if row["verdict"] in (PASS, FAIL)]
-            within = sum(row["verdict"] == PASS for row in judged)
-            known = sum(row["verdict"] == KNOWN for row in own)
+            verdicts = [row["verdict"] for row in own]
+            within, judged = count_within(verdicts)
+            known = verdicts.count(KNOWN)
             seconds = own[0]["seconds"] if own else math.nan
-            count = f"{within} of {len(judged)}"
+            count = f"{within} of {judged}"
             if known:
                 count += f", and {known} known differences"
             cells += [count, f"{seconds:.0f}"]
@@ -206,16 +213,9 @@ def judged_figures(own: dict[str, Rows]) -> Iterator[str]:
 
 def reasons(own: dict[str, Rows]) -> Iterator[str]:
     """Yield the reasons of the limits, each with its figures."""
-    names: dict[str, list[str]] = {}
-    for row in [*own["coarse"], *own["fine"]]:
-        if row["figure"] not in names.setdefault(row["reason"], []):
-            names[row["reason"]].append(row["figure"])
-    rows = []
-    for reason, group in names.items():
-        rows.append(
-            (group[0] if len(group) == 1 else f"{group[0]} and {len(group) - 1} more", reason)
-        )
-    yield from table(("figure", "why this limit"), rows)
+    rows = [*own["coarse"], *own["fine"]]
+    pairs = group_by_reason((row["figure"], row["reason"]) for row in rows)
+    yield from table(("figure", "why this limit"), pairs)
 
 
 def series(entry: Entry, own: dict[str, Rows]) -> Iterator[str]:

@@ -16,10 +16,18 @@ from vi_contact.validation.data import read_data
 from vi_contact.validation.entry import RECORDS
 from vi_contact.validation.report import describe, figure_rows, write_report
 from vi_contact.validation.results import find_moved, rows_of
-from vi_contact.validation.runner import judge_mutant
+from vi_contact.validation.runner import count_within, judge_mutant
 from vi_contact.validation.statistics import agreement
 
 pytestmark = pytest.mark.serial
+
+
+def refuses(folder: Path, sentence: str) -> str:
+    """The entry fails, by a sentence that begins with its name; the sentence."""
+    outcome = run_entry(folder)
+    assert outcome.status == "fail" and outcome.why[0].startswith("line: ")
+    assert sentence in outcome.why[0]
+    return outcome.why[0]
 
 
 def test_an_entry_passes(tmp_path: Path) -> None:
@@ -58,9 +66,8 @@ def test_a_run_sees_no_value_that_it_is_compared_with(tmp_path: Path) -> None:
     ],
 )
 def test_data_that_are_no_numbers_fail(tmp_path: Path, rows: str, sentence: str) -> None:
-    outcome = run_entry(small_entry(tmp_path / "line", rows=rows))
-    assert outcome.status == "fail" and outcome.why[0].startswith("line: ")
-    assert sentence in outcome.why[0] and "data.csv" in outcome.why[0]
+    why = refuses(small_entry(tmp_path / "line", rows=rows), sentence)
+    assert "data.csv" in why
 
 
 def test_data_without_a_source_or_a_unit_fail(tmp_path: Path) -> None:
@@ -122,9 +129,7 @@ def test_an_entry_that_does_not_fit_fails(
     tmp_path: Path, old: str, new: str, sentence: str
 ) -> None:
     assert old in TOML
-    outcome = run_entry(small_entry(tmp_path / "line", toml=TOML.replace(old, new)))
-    assert outcome.status == "fail" and outcome.why[0].startswith("line: ")
-    assert sentence in outcome.why[0]
+    refuses(small_entry(tmp_path / "line", toml=TOML.replace(old, new)), sentence)
 
 
 @pytest.mark.parametrize(
@@ -148,9 +153,17 @@ def test_a_run_that_finds_something_else_fails(
     tmp_path: Path, old: str, new: str, sentence: str
 ) -> None:
     assert old in RUN
-    outcome = run_entry(small_entry(tmp_path / "line", run=RUN.replace(old, new)))
-    assert outcome.status == "fail" and outcome.why[0].startswith("line: ")
-    assert sentence in outcome.why[0]
+    refuses(small_entry(tmp_path / "line", run=RUN.replace(old, new)), sentence)
+
+
+def test_an_entry_without_inputs_fails(tmp_path: Path) -> None:
+    toml = TOML[: TOML.index("[inputs.factor]")] + TOML[TOML.index("[[figure]]") :]
+    refuses(small_entry(tmp_path / "line", toml=toml), "changes 'factor', which is no input")
+
+
+def test_a_known_difference_that_has_grown_counts_as_a_fail() -> None:
+    verdicts = ["pass", "known difference", "fail", "told", "within", "outside"]
+    assert count_within(verdicts) == (1, 2)
 
 
 def test_a_step_failure_fails_with_the_name(tmp_path: Path) -> None:

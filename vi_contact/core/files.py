@@ -207,8 +207,11 @@ def write_csv(path: str | Path, header: Sequence[str], rows: Iterable[Sequence[A
     return Path(path)
 
 
-def to_json(facts: Mapping[str, Any]) -> str:
-    """Return strict JSON of numbers, texts, arrays and mappings; NaN and infinity become null."""
+def to_json(facts: Mapping[str, Any] | Sequence[Any]) -> str:
+    """Return strict JSON of numbers, texts, lists, arrays and mappings.
+
+    NaN and infinity become null.
+    """
     return json.dumps(_plain(facts), indent=2, ensure_ascii=False, allow_nan=False)
 
 

@@ -27,7 +27,7 @@ from types import ModuleType
 from typing import Any
 
 from ..core.arguments import check_arguments
-from ..core.checks import instance, optional, quote, several
+from ..core.checks import instance, number, optional, quote, several
 from ..core.errors import InputError
 from ..core.own_files import read_bytes
 from .data import Data, Row, read_data
@@ -304,7 +304,7 @@ def _read_folder(folder: Path) -> Entry:
         about=tables["about"],
         model=tables["model"],
         is_not=tables["is_not"],
-        inputs={name: _read_input(name, table) for name, table in tables["inputs"].items()},
+        inputs={name: _read_input(name, table) for name, table in tables.get("inputs", {}).items()},
         data=data,
         records=tables.get("records", {}),
         statistics=[_read_statistic(table) for table in tables.get("statistic", [])],
@@ -335,22 +335,6 @@ def _text(table: Mapping[str, Any], key: str, owner: str) -> str:
     return value
 
 
-def _positive(table: Mapping[str, Any], key: str, owner: str) -> float:
-    """Return a finite number above zero of a table."""
-    value = _number(table, key, owner)
-    if value <= 0.0:
-        raise InputError(f"{owner}: {key} is {value}: give a number above zero")
-    return value
-
-
-def _number(table: Mapping[str, Any], key: str, owner: str) -> float:
-    """Return a finite number of a table."""
-    value = table.get(key)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise InputError(f"{owner}: {key} is {quote(value)}: give a finite number")
-    return float(value)
-
-
 def _read_input(name: str, table: Any) -> Input:
     """Return an input of entry.toml."""
     owner = f"input '{name}'"
@@ -362,7 +346,8 @@ def _read_input(name: str, table: Any) -> Input:
     value = table.get("value")
     if isinstance(value, bool | str):
         return Input(value, "", table["kind"], source)
-    return Input(_number(table, "value", owner), _text(table, "unit", owner), table["kind"], source)
+    value = number(owner, "value", value)
+    return Input(value, _text(table, "unit", owner), table["kind"], source)
 
 
 def _read_statistic(table: Mapping[str, Any]) -> Statistic:
@@ -375,8 +360,8 @@ def _read_statistic(table: Mapping[str, Any]) -> Statistic:
         name=_text(table, "name", owner),
         series=_text(table, "series", owner),
         what=what,
-        value=_number(table, "wanted", owner),
-        limit=_positive(table, "limit", owner),
+        value=number(owner, "wanted", table.get("wanted")),
+        limit=number(owner, "limit", table.get("limit"), positive=True),
         reason=_text(table, "reason", owner),
     )
 
@@ -414,7 +399,7 @@ def _expand_figure(entry: Entry, table: Mapping[str, Any], rows: Sequence[Row]) 
     if ("wanted" in table) == ("column" in table):
         raise InputError(f"{owner}: give wanted, or a column of data.csv, and not both")
     if "wanted" in table:
-        value = _number(table, "wanted", owner)
+        value = number(owner, "wanted", table.get("wanted"))
         yield Wanted(name, unit, value, _limit(table, value, owner), reason, known=known)
         return
 
@@ -453,9 +438,9 @@ def _limit(table: Mapping[str, Any], value: float, owner: str) -> float:
 
     ``floor`` is that of values up to ``up_to``.
     """
-    limit = _positive(table, "limit", owner)
-    if "floor" in table and abs(value) <= _positive(table, "up_to", owner):
-        return _positive(table, "floor", owner)
+    limit = number(owner, "limit", table.get("limit"), positive=True)
+    if "floor" in table and abs(value) <= number(owner, "up_to", table.get("up_to"), positive=True):
+        return number(owner, "floor", table.get("floor"), positive=True)
     if not table.get("relative", False):
         return limit
     if value == 0.0:

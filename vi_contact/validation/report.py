@@ -8,7 +8,7 @@ from ..practice.plots.pages import write_pages
 from ..practice.plots.sections import Section, Table, format_number
 from .entry import KINDS, Entry
 from .results import write_results
-from .runner import FAIL, SKIP, Outcome
+from .runner import FAIL, SKIP, Outcome, count_within, group_by_reason
 from .statistics import QUANTITIES, Agreement
 
 HEADER = ("figure", "unit", "found", "wanted", "error", "limit", "verdict")
@@ -58,13 +58,12 @@ def _sum_up(outcomes: Sequence[Outcome]) -> Section:
     rows = []
     for outcome in outcomes:
         found = outcome.found
-        judged = [one for one in outcome.judgements if not one.counted and not one.known]
-        within = sum(one.within for one in judged)
+        within, judged = count_within([one.verdict for one in outcome.judgements])
         rows.append(
             (
                 outcome.name,
                 outcome.status,
-                f"{within} of {len(judged)}",
+                f"{within} of {judged}",
                 f"{outcome.seconds:.1f}",
                 "-" if found is None else str(found.unknowns),
                 "-" if found is None else format_number(found.certificate),
@@ -96,9 +95,10 @@ def _section_of(outcome: Outcome, pictures: Sequence[Path]) -> Section:
         f"Source: {entry.data.about['source']}; {entry.data.about['how']}; uncertainty: "
         f"{entry.data.about['uncertainty']}.",
     ]
+    reasons = group_by_reason((one.name, one.reason) for one in outcome.judgements)
     tables = [
         Table(HEADER, figure_rows(outcome)),
-        Table(("figure", "reason of the limit"), _reasons(outcome)),
+        Table(("figure", "reason of the limit"), reasons),
     ]
     if outcome.agreements:
         tables.append(Table(("series", *QUANTITIES), agreement_rows(outcome.agreements)))
@@ -116,18 +116,6 @@ def figure_rows(outcome: Outcome) -> list[tuple[str, ...]]:
     units = {} if outcome.entry is None else {one.name: one.unit for one in outcome.entry.told}
     for name, value in outcome.told.items():
         rows.append((name, units[name], f"{value:.6g}", "", "", "", "told"))
-    return rows
-
-
-def _reasons(outcome: Outcome) -> list[tuple[str, str]]:
-    """Return (figures, reason), the figures of one reason together."""
-    names: dict[str, list[str]] = {}
-    for one in outcome.judgements:
-        names.setdefault(one.reason, []).append(one.name)
-    rows = []
-    for reason, group in names.items():
-        words = group[0] if len(group) == 1 else f"{group[0]} and {len(group) - 1} more"
-        rows.append((words, reason))
     return rows
 
 

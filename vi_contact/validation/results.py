@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..core.files import write_output
+from ..core.files import write_csv
 from ..core.own_files import read_bytes
 from .runner import Outcome
 
@@ -91,12 +91,11 @@ def write_results(path: str | Path, outcomes: Iterable[Outcome]) -> None:
 
 def write_rows(path: str | Path, rows: Iterable[Row]) -> None:
     """Write rows of results as a csv file; NaN is an empty cell."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, COLUMNS, restval="", lineterminator="\n")
-    writer.writeheader()
+    table = []
     for row in rows:
-        writer.writerow({key: "" if value != value else value for key, value in row.items()})
-    write_output(path, text.getvalue().encode())
+        cells = [row.get(column) for column in COLUMNS]
+        table.append([None if cell != cell else cell for cell in cells])
+    write_csv(path, COLUMNS, table)
 
 
 def read_results(setting: str) -> list[Row]:

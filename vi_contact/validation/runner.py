@@ -7,7 +7,7 @@ of a limit is known to the computation.
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -109,6 +109,36 @@ class Outcome:
         return [one.name for one in self.judgements if not one.counted and not one.within]
 
 
+def count_within(verdicts: Sequence[str]) -> tuple[int, int]:
+    """Return how many figures are within their limits, and of how many that are judged.
+
+    A known difference is neither, unless it has grown beyond its limit: it then counts as a fail.
+
+    Args:
+        verdicts: of figures, as ``Judgement.verdict`` has them; others are passed over.
+    """
+    passed = verdicts.count(PASS)
+    return passed, passed + verdicts.count(FAIL)
+
+
+def group_by_reason(pairs: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Return pairs (figures, reason): of each reason the first figure, and how many more have it.
+
+    Args:
+        pairs: (figure, reason of its limit); a figure may come again.
+    """
+    names: dict[str, dict[str, None]] = {}
+    for name, reason in pairs:
+        names.setdefault(reason, {})[name] = None
+    rows = []
+    for reason, group in names.items():
+        words = next(iter(group))
+        if len(group) > 1:
+            words += f" and {len(group) - 1} more"
+        rows.append((words, reason))
+    return rows
+
+
 @check_arguments
 def run_entry(
     name: str | Path, *, setting: str = "coarse", change: Mapping[str, Any] | None = None
@@ -182,8 +212,8 @@ def judge(entry: Entry, setting: str, found: Found, seconds: float) -> Outcome:
     # what was found and nobody asked for, and the other way round
     why = []
     told = {one.name: found.figures.get(one.name, math.nan) for one in entry.told}
-    known = {one.name for setting in SETTINGS for one in entry.list_wanted(setting)}
-    unasked = set(found.figures) - known - set(told)
+    judged = {one.name for each in SETTINGS for one in entry.list_wanted(each)}
+    unasked = set(found.figures) - judged - set(told)
     if unasked:
         why.append(f"{entry.name}: run.py found '{min(unasked)}', which entry.toml does not judge")
     for one in judgements:

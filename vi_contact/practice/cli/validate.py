@@ -1,13 +1,12 @@
 """``vi-contact validate``: compute entries of the validation book, and judge them."""
 
 import argparse
-import json
-import math
 import sys
 import time
 from typing import TYPE_CHECKING, Any
 
 from ...core.errors import ViContactError
+from ...core.files import to_json
 from .errors import say, world
 from .options import add_command
 
@@ -86,7 +85,7 @@ def _validate(options: argparse.Namespace) -> str:
         _print(options, "written: " + ", ".join(map(str, paths)))
     if options.json and world().rank == 0:
         objects = [_as_object(one) | {"mutants": mutants[one.name]} for one in outcomes]
-        say(json.dumps(objects, indent=1))
+        say(to_json(objects))
     _refuse_failed(outcomes, mutants)
     skipped = sum(outcome.status == "skip" for outcome in outcomes)
     _print(options, f"{len(outcomes) - skipped} entries within their limits, {skipped} skipped")
@@ -149,21 +148,18 @@ def _print(options: argparse.Namespace, text: str) -> None:
 
 
 def _as_object(outcome: "Outcome") -> dict[str, Any]:
-    """Return an outcome as JSON has it: no NaN."""
+    """Return an outcome as JSON has it."""
     from ...validation.results import rows_of
-
-    def plain(value: Any) -> Any:
-        return None if isinstance(value, float) and not math.isfinite(value) else value
 
     rows = rows_of(outcome) if outcome.judgements else []
     shared = ("entry", "setting", "seconds", "unknowns", "certificate", "energy_defect")
     figures = []
     for row in rows:
-        figures.append({key: plain(value) for key, value in row.items() if key not in shared})
+        figures.append({key: value for key, value in row.items() if key not in shared})
     found = outcome.found
     series = {}
     for name, one in outcome.agreements.items():
-        series[name] = {key: plain(value) for key, value in vars(one).items()}
+        series[name] = dict(vars(one))
     return {
         "entry": outcome.name,
         "setting": outcome.setting,
@@ -171,8 +167,8 @@ def _as_object(outcome: "Outcome") -> dict[str, Any]:
         "why": list(outcome.why),
         "seconds": outcome.seconds,
         "unknowns": None if found is None else found.unknowns,
-        "certificate": None if found is None else plain(found.certificate),
-        "energy_defect": None if found is None else plain(found.defect),
+        "certificate": None if found is None else found.certificate,
+        "energy_defect": None if found is None else found.defect,
         "series": series,
         "figures": figures,
     }

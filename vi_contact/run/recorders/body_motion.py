@@ -102,6 +102,7 @@ class BodyMotion:
         if self.about is not None:
             d = self._momenta.dimension
             self._about = array(owner, "about", self.about, (d,), unit="metres")
+        self._names = list(self.columns())
         return self._row(state)
 
     def row(self, report: Report) -> Row:
@@ -120,4 +121,4 @@ class BodyMotion:
             body.compute_angular(self._about, momenta),
             body.compute_spin(momenta),
         ]
-        return dict(zip(self.columns(), np.concatenate(values).tolist(), strict=True))
+        return dict(zip(self._names, np.concatenate(values).tolist(), strict=True))
