@@ -6,14 +6,13 @@ the key, whose unit stands in the annotation of the argument (``core.quantities`
 
 import math
 import re
-import tomllib
 from collections.abc import Callable, Sequence
-from importlib.resources import files
 from typing import Any, get_origin
 
 from ....core.algebra import Array
 from ....core.checks import quote
 from ....core.errors import InputError
+from ...units.reading import NAME, read_unit
 from .expressions import LENGTH, Expression, Places
 from .table_calls import Spot
 
@@ -21,17 +20,8 @@ from .table_calls import Spot
 FIELD = Callable[[Array, float], Array]  # of points and the time
 AT_START = Callable[[Array], Array]  # of points
 HISTORY = Callable[[float], float]  # of the time
-Dimension = tuple[int, ...]  # exponents of metre, kilogram, second, radian
 _NUMBER = r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
-_NAME = "[A-Za-zµμ°%]+"  # of a unit
-_VALUE = re.compile(rf"(?<![\w.\s])\s*((?>{_NUMBER}))\s*((?:1\s*/\s*)?{_NAME}[^()+]*)")
-_FACTOR = re.compile(rf"([*·/]?)(?:(?<!\s)\s+)?(1(?=\s*/|$)|{_NAME})(?:\^?(-?[0-9])|([²³]))?\s*")
-_TABLES = tomllib.loads(files(__package__).joinpath("units.toml").read_text(encoding="utf-8"))
-_UNITS = _TABLES["alone"] | {
-    prefix + name: [factor * unit[0], *unit[1:]]
-    for prefix, factor in _TABLES["prefixes"].items()
-    for name, unit in _TABLES["with_prefix"].items()
-}
+_VALUE = re.compile(rf"(?<![\w.\s])\s*((?>{_NUMBER}))\s*((?:1\s*/\s*)?{NAME}[^()+]*)")
 
 
 def read_quantity(text: str, members: Sequence[Any], spot: Spot) -> Any:
@@ -127,8 +117,8 @@ def _read_expression(text: str, letters: str, spot: Spot) -> Expression:
         number, unit = match.groups()
         if spot.unit is None:
             raise InputError(f"no unit is known for it here: leave {quote(unit)} out")
-        factor, dimension = _read_unit(unit)
-        own_factor, own_dimension = _read_unit(spot.unit)
+        factor, dimension = read_unit(unit)
+        own_factor, own_dimension = read_unit(spot.unit)
         if dimension != own_dimension:
             proper = "% or as a plain number" if spot.unit == "1" else spot.unit
             raise InputError(f"{quote(unit)} is not a unit of it: give it in {proper}")
@@ -139,34 +129,3 @@ def _read_expression(text: str, letters: str, spot: Spot) -> Expression:
         if match is None:
             remedy = f"give a number, one with its unit, or arithmetic{variables}; "
         raise spot.make_error(f"is {quote(text)}: {remedy}{error}") from None
-
-
-def _read_unit(text: str) -> tuple[float, Dimension]:
-    """Return the factor to SI units and the dimension of a product.
-
-    After a "/" all divides up to the next "*".
-    """
-    size = 1.0
-    total: Dimension = (0, 0, 0, 0)
-    below = False  # whether factors divide
-    position = 0
-    while position < len(text):
-        match = _FACTOR.match(text, position)
-        if match is None:
-            raise InputError(f"{quote(text)} is not a unit: write one as kN/m3, cm/s^2 or Pa*s")
-        sign, name, digits, raised = match.groups()
-
-        # The power of this factor, from "2", "^2" or "²"; negative below a "/".
-        below = sign == "/" or (below and not sign)
-        power = int(digits) if digits else {"²": 2, "³": 3}.get(raised, 1)
-        if below:
-            power = -power
-        if name not in _UNITS:
-            known = ", ".join((*_TABLES["with_prefix"], *_TABLES["alone"]))
-            raise InputError(f"{quote(name)} is not a unit here: there are {known}, kPa, mm")
-
-        factor, *dimension = _UNITS[name]
-        size *= factor**power
-        total = tuple(a + power * b for a, b in zip(total, dimension, strict=True))
-        position = match.end()
-    return size, total
