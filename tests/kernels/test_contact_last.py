@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import logging
 import os
+import platform
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -248,3 +250,16 @@ def test_processes_that_compile_at_once_do_not_meet(small: Path, cold: Path) -> 
     assert all(run.returncode == 0 for run in runs) and told == {
         str(file) for file in cold.iterdir()
     }
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="about processors with AVX2")
+@pytest.mark.skipif("CC" in os.environ, reason="about Debian's own compiler")
+def test_loops_are_compiled_twice_for_processors_with_avx2() -> None:
+    """The macro FASTEST once did nothing in files that include no header of the C library first:
+    the compiled loops were right, and slower."""
+    library = compiler.compile_library(compiler.LOOPS, []).read_bytes()
+    for source in compiler.LOOPS:
+        names = re.findall(r"^FASTEST \w+\s+(\w+)\(", source.read_text("utf-8"), re.MULTILINE)
+        assert names, source.name
+        for name in names:
+            assert f"{name}.avx2".encode() in library
