@@ -7,7 +7,7 @@ is the float64 array of its owned entries; scalars returned by ``dot`` and by ``
 number on every rank.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, Protocol, SupportsFloat
 
@@ -211,8 +211,6 @@ class EffectiveMatrix:
         algebra: that of its matrix.
         space: what its unknowns mean (``core.system.Space``); None where that is not known.
         inertia: (m, M) of A = m M + c C + k K; None where that is not known.
-        image: function x -> A x, made of products with M, C and K that others need too, where that
-            saves work.
     """
 
     def __init__(
@@ -222,13 +220,11 @@ class EffectiveMatrix:
         *,
         space: Any = None,
         inertia: tuple[float, Matrix] | None = None,
-        image: Callable[[Array], Array] | None = None,
     ) -> None:
         self.matrix = matrix
         self.algebra = algebra
         self.space = space
         self.inertia = inertia
-        self.image = matrix.__matmul__ if image is None else image
         self._last: tuple[Indices, Any] | None = None  # unknowns and the factor with them last
 
     def contact_last(self, last: Indices) -> Any:

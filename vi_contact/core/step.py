@@ -19,10 +19,10 @@ all ranks: what follows may be collective.
 
 The loop (``run.march``) calls, for every step, in this order:
 
-    scheme.step -> solver.solve -> kkt_residual (core.verify) -> scheme.finish -> the impact law,
-    scheme.jump
+    scheme.stage -> pose (core.stage) -> solver.solve -> kkt_residual (core.verify) ->
+    scheme.finish -> the impact law, scheme.jump
 
-and ``scheme.effective_matrix`` and ``solver.prepare`` once for every dt. Below n are the unknowns
+and ``make_matrix`` (core.stage) and ``solver.prepare`` once for every dt. Below n are the unknowns
 this rank owns, m its contact conditions, d the dimensions. ``problem.equations`` is the system to
 march: in the rotated basis, with mass law and excitations in it; ``problem.surface`` are its
 contact conditions. Arrays that come in are read, never written to.
@@ -31,7 +31,7 @@ contact conditions. Arrays that come in are read, never written to.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -42,6 +42,9 @@ from .errors import InputError, ViContactError
 from .problem import ContactProblem
 from .protocols import FrictionLaw, Frictionless, MassLaw
 from .surfaces import ContactSurface
+
+if TYPE_CHECKING:
+    from .stage import Answer, Stage
 
 
 @dataclass(frozen=True)
@@ -107,6 +110,9 @@ class StepProblem:
             in static problems, where friction is that of rest.
         lower: (m,) bounds from below too, which ``Volume`` alone knows (``vi``); None in the steps
             of a scheme.
+        origin: the unknowns (n,) that x is an increment of (``core.stage``); None where x is all.
+        internal: ``scale`` times K u (n,) at x = 0, a part of b beside which rounding is judged;
+            None where it is not known.
 
     Of several runs at once (``by_rows`` of ``Scheme``), b, guess and active have a row for each,
     (k, n) and (k, m); what the runs share is as above.
@@ -125,14 +131,16 @@ class StepProblem:
     slip0: Array | None = None
     rate_factor: float = 0.0
     lower: Array | None = None
+    origin: Array | None = None
+    internal: Array | None = None
 
     def __post_init__(self) -> None:
         rows = self.guess.shape[-1]
         conditions = self.surface.count
-        sizes = (self.b.shape[-1], len(self.bound), self.active.shape[-1])
+        sizes = (self.b.shape[-1], self.bound.shape[-1], self.active.shape[-1])
         if sizes != (rows, conditions, conditions):
             raise InputError(
-                f"StepProblem has {len(self.b)} loads for {rows} unknowns, {len(self.bound)} "
+                f"StepProblem has {len(self.b)} loads for {rows} unknowns, {sizes[1]} "
                 f"bounds and a contact set of {len(self.active)} for {conditions} conditions: give "
                 "one of each"
             )
@@ -284,6 +292,23 @@ class Balance:
     r_n: Array
     r_t: Array | None = None
 
+    def weigh(self, weight: float, other: "Balance | None" = None) -> "Balance":
+        """Return weight times this equation, plus 1 - weight times another one.
+
+        Args:
+            weight: of this equation.
+            other: the other one, in which missing tangential reactions count as zero; None: none
+                is added.
+        """
+        values: dict[str, Any] = {}
+        for name, value in vars(self).items():
+            mean = None if value is None else weight * value
+            also = None if other is None else getattr(other, name)
+            if mean is not None and also is not None:
+                mean = mean + (1.0 - weight) * also
+            values[name] = mean
+        return Balance(**values)
+
 
 class Scheme(Protocol):
     """Turn a state into a StepProblem, and the answer into the next state: a time scheme.
@@ -294,7 +319,7 @@ class Scheme(Protocol):
 
     - ``penetrates = True``: the contact condition is on velocities, so that states of its own runs
       may lie inside the obstacle, and the scheme goes on from them.
-    - ``by_rows = True``: it steps several runs at once. ``step`` and ``finish`` then also get
+    - ``by_rows = True``: it steps several runs at once. ``stage`` and ``finish`` then also get
       vectors as rows, (k, n) and (k, m), and return rows.
     """
 
@@ -333,56 +358,28 @@ class Scheme(Protocol):
             dt: size of the next step [s].
         """
 
-    def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
-        """Return A (n rows) of ``problem`` for all steps of ``dt`` [s].
+    def stage(self, problem: ContactProblem, state: State, dt: float) -> "Stage":
+        """Return where the balance of a step holds, from ``state`` to state.t + dt.
 
-        As a rule it is ``problem.equations.effective(…)``. It is symmetric positive definite, and
-        nothing in it depends on time or state. It is made once for every dt.
-        """
-
-    def step(
-        self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
-    ) -> StepProblem:
-        """Return the one-step problem from ``state`` to state.t + dt.
-
-        The meaning of x is the scheme's own (u1 or v1, say); ``bound`` and ``scale`` fit it, and
-        ``scale`` is the same in all steps of one dt.
+        Its slopes and its scale are the same in all steps of one dt: A, which is made of them, is
+        factorised once.
 
         Args:
             problem: the problem that is marched.
             state: the state at the beginning of the step.
-            A: the effective matrix of this dt.
             dt: size of the step [s].
         """
 
     def finish(
-        self,
-        problem: ContactProblem,
-        state: State,
-        step: StepProblem,
-        result: StepResult,
-        dt: float,
+        self, problem: ContactProblem, state: State, stage: "Stage", answer: "Answer", dt: float
     ) -> State:
         """Return the state at the end of a step, before the impact law.
 
         Args:
             problem: the problem that is marched.
             state: the state that the step began with.
-            step: what ``step()`` returned for it.
-            result: the certified answer. Reactions in it are ``scale`` times newtons; those of the
-                new state are newtons.
-            dt: size of the step [s].
-        """
-
-    def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the equation of motion that a step satisfied, for the energy ledger.
-
-        The loop calls it when a recorder asks.
-
-        Args:
-            problem: the problem that is marched.
-            old: the state that the step began with.
-            new: what ``finish`` returned, before the impact law.
+            stage: what ``stage()`` returned for it.
+            answer: the certified answer, with reactions in newtons.
             dt: size of the step [s].
         """
 

@@ -242,6 +242,29 @@ class ContactSurface:
         """Return B_t x (m, d - 1), zero where the tangent is prescribed."""
         return np.where(self.tangents >= 0, x.take(self.tangents, -1), 0.0)
 
+    def put_normal(self, x: Array, values: Array, chosen: Mask) -> None:
+        """Write normal values into an x of the caller's own, (n,) or rows (k, n).
+
+        Args:
+            x: where they are written.
+            values: (m,) or rows (k, m).
+            chosen: of the shape of the conditions (of each row), True where they are written.
+        """
+        normal = x[..., self.owned]
+        x[..., self.owned] = np.where(chosen, values, normal)
+
+    def put_tangential(self, x: Array, values: Array, chosen: Mask) -> None:
+        """Write tangential values into an x of the caller's own, (n,) or rows (k, n).
+
+        Args:
+            x: where they are written.
+            values: (m, d - 1) or rows (k, m, d - 1).
+            chosen: of the same shape, True where they are written; prescribed tangents are left.
+        """
+        free = self.tangents >= 0
+        places = self.tangents[free]
+        x[..., places] = np.where(chosen[..., free], values[..., free], x[..., places])
+
     def slip(self, u: Array, t: float) -> Array:
         """Return the tangential displacements relative to the obstacle (m, d - 1) [m].
 

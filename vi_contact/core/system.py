@@ -387,35 +387,6 @@ class SemiDiscreteSystem:
             return self.load(t)
         return (self._products.get("load") or self._open_memory("load"))(float(t))
 
-    def rates(self, u0: Array, u1: Array, v0: Array, v1: Array, dt: float) -> tuple[Array, Array]:
-        """Return (u1 - u0)/dt [m/s] and (v1 - v0)/dt [m/s²].
-
-        The products of C and M with them are then known: differences of those with both ends. So
-        the energy ledger, which asks for them, costs no product.
-
-        Args:
-            u0: displacement (n,) [m] before the step.
-            u1: displacement (n,) [m] after it.
-            v0: velocity (n,) [m/s] before the step.
-            v1: velocity (n,) [m/s] after it.
-            dt: size of the step [s].
-        """
-        velocity = (u1 - u0) / dt if self.C is None else self._compute_rate("C", u0, u1, dt)
-        acceleration = self._compute_rate("M", v0, v1, dt)
-        return velocity, acceleration
-
-    def _compute_rate(self, name: str, x0: Array, x1: Array, dt: float) -> Array:
-        """Return (x1 - x0)/dt, whose product with a matrix is then known.
-
-        Args:
-            name: "M", "C" or "K".
-            x0: (n,), or rows (k, n), before the step.
-            x1: (n,), or rows (k, n), after it.
-            dt: size of the step [s].
-        """
-        product = self._open_memory(name)
-        return product.know((x1 - x0) / dt, lambda: (product(x1) - product(x0)) / dt)
-
     def changed(self, **values: Any) -> "SemiDiscreteSystem":
         """Return the same system with other values of some attributes, and with no factor yet.
 
@@ -424,7 +395,7 @@ class SemiDiscreteSystem:
         """
         return replace(self, **values)
 
-    def effective(self, *, m: float, c: float, k: float, shares: bool = False) -> EffectiveMatrix:
+    def effective(self, *, m: float, c: float, k: float) -> EffectiveMatrix:
         """Return A = m M + c C + k K for all steps of one size.
 
         Its factor is made when it is first needed.
@@ -433,28 +404,12 @@ class SemiDiscreteSystem:
             m: factor of the mass, [1/s²] where x is a displacement.
             c: factor of the damping, [1/s] there.
             k: factor of the stiffness, 1 there.
-            shares: whether the scheme needs M x, C x and K x in its next step, so that A x may be
-                made of them.
         """
         terms = [(m, self.M), (k, self.K)]
         if self.C is not None:
             terms.append((c, self.C))
-
-        # A x, which the certificate asks for, out of products that the scheme finds in the memory
-        # when it steps on from x.
-        def image(x: Array) -> Array:
-            total = m * self.product("M", x)
-            total += self.product("K", x) if k == 1.0 else k * self.product("K", x)
-            if self.C is not None:
-                total += c * self.product("C", x)
-            return total
-
         return EffectiveMatrix(
-            self.algebra.combine(terms),
-            self.algebra,
-            space=self.space,
-            inertia=(m, self.M),
-            image=image if shares else None,
+            self.algebra.combine(terms), self.algebra, space=self.space, inertia=(m, self.M)
         )
 
     def with_load(self, *terms: tuple[Array, Callable[[float], float]]) -> "SemiDiscreteSystem":

@@ -75,8 +75,9 @@ class _Sizes(NamedTuple):
     loose: Any  # r_n where it is said to be open
     load: Any  # b
     image: Any  # A x
+    internal: Any  # K u where x is zero
     x: Any
-    guess: Any
+    guess: Any  # of a step in increments, what x is an increment of
     r_n: Any
 
 
@@ -88,7 +89,7 @@ def _measure_sizes(step: StepProblem, result: StepResult) -> list[_Sizes]:
     surface = step.surface
 
     # Equilibrium: what is left of A x - b when the contact forces are added to it.
-    image = step.A.image(result.x)
+    image = step.A @ result.x
     reactions = surface.reaction_load(result.r_n, result.x.shape[-1], result.r_t)
     unbalanced = image - step.b + reactions
 
@@ -117,8 +118,9 @@ def _measure_sizes(step: StepProblem, result: StepResult) -> list[_Sizes]:
         loose,
         load=step.b,
         image=image,
+        internal=step.b if step.internal is None else step.internal,
         x=result.x,
-        guess=step.guess,
+        guess=step.guess if step.origin is None else step.origin,
         r_n=result.r_n,
     )
     largest = _find_largest(surface.comm, arrays)
@@ -136,11 +138,13 @@ def _make_certificate(step: StepProblem, result: StepResult, sizes: _Sizes) -> C
     # x_ref and r_ref of ``Certificate``: the largest displacement (or velocity), and the largest
     # force, in the units of x and of b.
     length = max(sizes.x, sizes.guess)
-    force = max(sizes.load, sizes.r_n)
-    rounding = ROUNDING * step.A.largest * sizes.x
+    force = max(sizes.load, sizes.internal, sizes.r_n)
+    rounding = ROUNDING * step.A.largest * (sizes.x if step.origin is None else length)
     cone, dissipation = _judge_friction(step, result, length, force)
     return Certificate(
-        equilibrium=_divide(sizes.unbalanced, max(sizes.load, sizes.image, rounding)),
+        equilibrium=_divide(
+            sizes.unbalanced, max(sizes.load, sizes.internal, sizes.image, rounding)
+        ),
         penetration=_divide(sizes.overlap, length),
         tension=_divide(sizes.tension, force),
         complementarity=float(

@@ -15,6 +15,7 @@ the gap opens.
 """
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -24,7 +25,8 @@ from ..core.checks import instance
 from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
 from ..core.sizes import refuse_dense
-from ..core.step import State, StepProblem, StepResult
+from ..core.stage import Answer, Stage
+from ..core.step import State, StepProblem
 from ..schemes.midpoint import Midpoint
 from ..solvers.condensed import Condensed
 from .contact_law import ContactLayer
@@ -36,13 +38,6 @@ RATE = "layer_rate"  # in a state's memory: d ln(gap)/dt of the contact points [
 # Newton's method ends at such changes of the gaps.
 GAP_TOLERANCE = 1e-11  # relative to the gaps
 ROUNDING = 1e-15  # relative to the displacements that a gap is a difference of
-
-
-@dataclass(frozen=True)
-class LayeredStep(StepProblem):
-    """Hold a step whose loads contain the layer's mean reactions (m,) [N]."""
-
-    layer: Array | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,6 +54,8 @@ class BoundaryLayer(Midpoint):
             or other supports, or a gap that is not positive.
         StepFailure: Newton's method for the gaps of a step fails.
     """
+
+    by_rows: ClassVar[bool] = False  # each run has gaps of its own
 
     law: ContactLayer
 
@@ -112,27 +109,27 @@ class BoundaryLayer(Midpoint):
             )
         return state
 
-    def step(
-        self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
-    ) -> StepProblem:
-        """Prepare the midpoint step with the layer's reactions among the loads. Collective.
+    def press(
+        self, problem: ContactProblem, state: State, stage: Stage, step: StepProblem, dt: float
+    ) -> Stage:
+        """Return the midpoint's stage with the layer's reactions in its balance. Collective.
 
         Args:
             problem: the problem of the run.
             state: at the beginning of the step.
-            A: matrix of the step.
+            stage: the midpoint's.
+            step: what is posed of it, without the layer.
             dt: time step [s].
 
         Raises:
             StepFailure: a gap that is closed, or Newton's method for the gaps fails.
         """
-        step = super().step(problem, state, A, dt)
         surface = problem.surface
         if surface.total == 0:
-            return step
+            return stage
         old = surface.gap(state.t) - surface.normal_values(state.u)
         closed, away = surface.comm.max(
-            np.array([np.max(-old, initial=-np.inf), max_abs(step.bound - old)])
+            np.array([np.max(-old, initial=-np.inf), max_abs(stage.bound - old)])
         )
         if not closed < 0.0:
             raise StepFailure(
@@ -141,6 +138,7 @@ class BoundaryLayer(Midpoint):
             )
 
         # The gaps of all ranks: the old ones, those of the step without layer, and the old rates.
+        A = step.A
         free = step.bound - surface.normal_values(A.factor.solve(step.b))
         rate = self._rate(problem, state, old)
         values = surface.everywhere(np.column_stack([old, free, rate, surface.weights]))
@@ -158,11 +156,10 @@ class BoundaryLayer(Midpoint):
             G = compliances[A] * (step.scale * weights)
             pressure = self._pressure(step, G, free, old, rate, dt)
 
-        # They are loads of the step, which has no contact of its own any more.
+        # They stand in the balance of the step, which has no contact of its own any more.
         reaction = surface.weights * pressure[surface.slots]
-        b = step.b - step.scale * surface.reaction_load(reaction, len(step.b))
-        fields = vars(step) | {"b": b, "active": np.zeros(surface.count, dtype=bool)}
-        return LayeredStep(**fields, layer=reaction)
+        carried = surface.reaction_load(reaction, len(step.b))
+        return replace(stage, carried=carried, active=np.zeros(surface.count, dtype=bool))
 
     def _rate(self, problem: ContactProblem, state: State, gap: Array) -> Array:
         """Return ẏ = w_0 (m,) [1/s]: carried inside the layer, from the velocities outside.
@@ -218,12 +215,7 @@ class BoundaryLayer(Midpoint):
         )
 
     def finish(
-        self,
-        problem: ContactProblem,
-        state: State,
-        step: StepProblem,
-        result: StepResult,
-        dt: float,
+        self, problem: ContactProblem, state: State, stage: Stage, answer: Answer, dt: float
     ) -> State:
         """Return the midpoint's state, whose reactions are the layer's.
 
@@ -232,19 +224,19 @@ class BoundaryLayer(Midpoint):
         Args:
             problem: the problem of the run.
             state: at the beginning of the step.
-            step: as ``step`` has prepared it.
-            result: of the solver.
+            stage: with the layer's reactions.
+            answer: of the step.
             dt: time step [s].
         """
-        new = super().finish(problem, state, step, result, dt)
-        reaction = step.layer if isinstance(step, LayeredStep) else None
-        if reaction is None:
+        new = super().finish(problem, state, stage, answer, dt)
+        if stage.carried is None:
             return new
+        surface = problem.surface
+        reaction = surface.normal_values(stage.carried)
 
         # w_1 of the midpoint rule in ln(gap). It is kept as a vector of unknowns, since these pass
         # through checkpoints.
-        surface = problem.surface
-        gap = surface.gap(step.t) - surface.normal_values(new.u)
+        gap = surface.gap(stage.t) - surface.normal_values(new.u)
         old = surface.gap(state.t) - surface.normal_values(state.u)
         rate = 2.0 / dt * np.log(np.maximum(gap / old, 1e-300)) - self._rate(problem, state, old)
         memory = {RATE: surface.reaction_load(rate, len(new.u))}

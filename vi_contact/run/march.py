@@ -3,7 +3,8 @@
 A *base step* is one of the plan (``time_steps``). ``HalvedAtImpact`` may make it in halves, which
 are certified steps like any other. Every step is made in the order that ``core.step`` states:
 
-    scheme.step -> solver.solve with its certificate -> scheme.finish -> impact law -> scheme.jump
+    scheme.stage -> pose -> solver.solve with its certificate -> scheme.finish -> impact law ->
+    scheme.jump
 
 Whatever a user's own function raises on one rank within ``with together(comm)`` is raised on all
 ranks at its end.
@@ -19,6 +20,7 @@ from ..core.collective import call_user, together, together_if_own
 from ..core.problem import ContactProblem
 from ..core.products import freeze
 from ..core.protocols import Impact
+from ..core.stage import average, complete, make_matrix, pose
 from ..core.state_checks import initial_state
 from ..core.step import Report, Scheme, Solver, State
 from ..solvers.certified import TOLERANCE, CertifiedSolver
@@ -171,16 +173,20 @@ class March:
         scheme = self.method.scheme
         state = self._convert_state(dt)
 
-        # The scheme reduces the step to one inequality, A x = b with contact.
-        A, solver = self.prepared.get(dt, (None, None))
+        # The scheme says where the balance holds: one inequality A d = b with contact.
         with together_if_own(problem.surface.comm, scheme):
-            if A is None:
-                A = scheme.effective_matrix(problem, dt)
-            step = scheme.step(problem, state, A, dt)
-        if solver is None:
+            stage = scheme.stage(problem, state, dt)
+        if dt not in self.prepared:
             method = self.method
-            solver = CertifiedSolver(problem, A, step.scale, method.solvers, method.tolerance)
+            A = make_matrix(problem.equations, stage)
+            solver = CertifiedSolver(problem, A, stage.scale, method.solvers, method.tolerance)
             self.prepared[dt] = (A, solver)
+        A, solver = self.prepared[dt]
+        step = pose(problem, stage, A)
+        if hasattr(scheme, "press"):  # a law of its own at the contact
+            with together_if_own(problem.surface.comm, scheme):
+                stage = scheme.press(problem, state, stage, step, dt)
+            step = pose(problem, stage, A)
 
         # It is solved with a certificate, and thrown away if it is too long for an impact, which is
         # where a point closes that was open before.
@@ -191,15 +197,14 @@ class March:
             return None
 
         # Displacements and velocities at its end: of the scheme, then of the impact law.
+        answer = complete(stage, step, result)
         with together_if_own(problem.surface.comm, scheme):
-            free = scheme.finish(problem, state, step, result, dt)
+            free = scheme.finish(problem, state, stage, answer, dt)
         with together_if_own(problem.surface.comm, problem.impact or scheme):
             new = after_impact(problem, scheme, state, free, dt)
         for vector in (free.u, free.v, new.u, new.v):
             freeze(vector)  # products with them are remembered, and have to stay true
 
-        # Forces of the step's balance are formed only if some recorder asks for them.
-        averages = partial(scheme.balance, problem, state, free, dt)
         return Report(
             problem=problem,
             old=state,
@@ -208,7 +213,8 @@ class March:
             step=step,
             result=result,
             certificate=certificate,
-            averages=averages,
+            # formed only if some recorder asks for it
+            averages=partial(average, problem, stage, answer),
             escalated=escalated,
         )
 

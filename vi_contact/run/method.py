@@ -24,7 +24,7 @@ from ..solvers.automatic import Automatic
 from .loose_bodies import refuse_loose_bodies
 from .time_steps import TimeSteps, plan_steps
 
-SCHEME = ("check", "start", "jump", "effective_matrix", "step", "finish", "balance")
+SCHEME = ("check", "start", "jump", "stage", "finish")
 SLACK = 10.0  # of the tolerance, and of the largest displacement: what a state may penetrate
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from ..core.algebra import Array
 from ..core.problem import ContactProblem
 from ..core.products import freeze
-from ..core.step import Report, State, StepProblem
+from ..core.step import Balance, Report, State, StepProblem
 from ..core.system import Load, evaluate_history
 
 
@@ -124,10 +124,12 @@ def split_step(problem: ContactProblem, many: StepProblem, row: int) -> StepProb
     return StepProblem(
         A=many.A,
         b=many.b[row],
-        bound=many.bound,
+        bound=many.bound if many.bound.ndim == 1 else many.bound[row],
         surface=many.surface,
         scale=many.scale,
         guess=many.guess[row],
+        origin=None if many.origin is None else many.origin[row],
+        internal=None if many.internal is None else many.internal[row],
         active=many.active[row],
         t=many.t,
         k=many.k,
@@ -135,6 +137,19 @@ def split_step(problem: ContactProblem, many: StepProblem, row: int) -> StepProb
         slip0=slip0,
         rate_factor=many.rate_factor,
     )
+
+
+def split_balance(many: Balance, row: int) -> Balance:
+    """Return the mean equation of one run.
+
+    Args:
+        many: that of all runs, with rows.
+        row: of the run.
+    """
+    values: dict[str, Any] = {}
+    for name, value in vars(many).items():
+        values[name] = None if value is None else value[row]
+    return Balance(**values)
 
 
 @dataclass(frozen=True)

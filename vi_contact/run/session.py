@@ -27,6 +27,7 @@ from ..core.algebra import Comm, largest
 from ..core.checks import on_all
 from ..core.collective import call_user, together
 from ..core.errors import InputError, Interrupted, OutOfTime, StepFailure
+from ..core.stage import complete, pose
 from ..core.step import Recorder, Report, Row, State, StepResult
 from ..core.timing import take_report
 from .damping import NOT_COMPUTED, describe_damping
@@ -429,9 +430,10 @@ class Session:
 
         def linear_step() -> None:
             """Make a step as if there were no contact."""
-            step = scheme.step(problem, old, A, dt)
+            stage = scheme.stage(problem, old, dt)
+            step = pose(problem, stage, A)
             result = StepResult(A.factor.solve(step.b), none, none.astype(bool), 0, "linear")
-            scheme.finish(problem, old, step, result, dt)
+            scheme.finish(problem, old, stage, complete(stage, step, result), dt)
 
         seconds = repeat(linear_step, number=1, repeat=LINEAR_STEPS + 1)
         return float(np.median(seconds[1:]))  # the first is slower

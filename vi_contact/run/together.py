@@ -16,19 +16,28 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
 
 from ..core.errors import InputError, ViContactError
 from ..core.products import freeze
+from ..core.stage import Answer, Stage, average, complete, make_matrix, pose
 from ..core.step import Balance, Report, State, StepProblem, StepResult
 from ..core.verify import kkt_residuals
 from ..solvers.certified import NEAR, CertifiedSolver
 from .march import March, after_impact
 from .method import Method
-from .rows import LazyRows, RowReport, join_loads, join_states, split_states, split_step
+from .rows import (
+    LazyRows,
+    RowReport,
+    join_loads,
+    join_states,
+    split_balance,
+    split_states,
+    split_step,
+)
 from .time_steps import StepPlan
 
 
@@ -152,8 +161,6 @@ class Group:
             run.state = self._states[row]
         left = [run for run in self._runs if run not in leaving]
         self._go_on_with(left, [run.state for run in left])
-        if self._runs and self._dt is not None:  # the problem is new, the factor of A is not
-            self._A = self._scheme.effective_matrix(self._problem, self._dt).share_factors(self._A)
 
     def advance(self) -> None:
         """Make the next step of all runs; those that cannot make it together leave."""
@@ -183,7 +190,7 @@ class Group:
             states.append(self._scheme.start(problem, self._states[row], dt))
         self._take_states(states)
         self._dt = dt
-        self._A = self._scheme.effective_matrix(self._problem, dt)
+        self._A = None
         self._solver = None
 
     def _solve(self, many: StepProblem, steps: LazyRows) -> Any:
@@ -198,20 +205,30 @@ class Group:
             return None
         return first.solve_many(many, steps.__getitem__)
 
+    def _pose(self, dt: float) -> tuple[Stage, StepProblem]:
+        """Return the stage of all runs and the step that is posed of it, as rows.
+
+        Args:
+            dt: the length of the step [s].
+        """
+        stage = self._scheme.stage(self._problem, self._many, dt)
+        if self._A is None:
+            self._A = make_matrix(self._problem.equations, stage)
+        return stage, pose(self._problem, stage, self._A)
+
     def _step(self, dt: float) -> list[Together]:
         """Make a step and hand out its reports, or the runs that cannot make it.
 
         Where there are such runs none is made.
         """
         runs = self._runs
-        scheme = self._scheme
         problem = self._problem
         if dt != self._dt:
             self._begin(dt)
 
         # The right-hand sides b of all runs as rows; who has no numbers there, or is driven into
         # its obstacle, meets the error again alone, where it is told.
-        many = scheme.step(problem, self._many, self._A, dt)
+        stage, many = self._pose(dt)
         if not np.isfinite(many.b.sum()):
             wrong = np.flatnonzero(~np.isfinite(many.b).all(axis=-1))
             if len(wrong):
@@ -237,7 +254,7 @@ class Group:
         if not leaving:
             result, leaving = self._judge(many, answers.rows, parts)
         if not leaving:
-            self._finish(many, result, parts, dt)
+            self._finish(stage, complete(stage, many, result), parts, dt)
         return [runs[row] for row in leaving]
 
     def _judge(
@@ -279,32 +296,28 @@ class Group:
         parts["certificate"] = certificates
         return rows, leaving
 
-    def _finish(
-        self, many: StepProblem, result: StepResult, parts: dict[str, Any], dt: float
-    ) -> None:
+    def _finish(self, stage: Stage, answer: Answer, parts: dict[str, Any], dt: float) -> None:
         """Make states, impacts and reports at the end of a step.
 
         Args:
-            many: the step of all runs.
-            result: its certified answers, as rows.
+            stage: of all runs.
+            answer: the certified answers, as rows.
             parts: of the reports, by row, to which the rest is added.
             dt: the length of the step [s].
         """
         problems = self._problems
         scheme = self._scheme
         old = self._states
-        rows = scheme.finish(self._problem, self._many, many, result, dt)
+        rows = scheme.finish(self._problem, self._many, stage, answer, dt)
         for vector in (rows.u, rows.v, *rows.memory.values()):
             freeze(vector)  # what is known of them stays true
         free = split_states(self._problem, problems, rows)
         self._many, self._states = self._apply_impact(rows, free, dt)
-        system = self._problem.equations
-        loads = [("load", t, t) for t in system.times]
+        whole = cache(partial(average, self._problem, stage, answer))
 
         def make_averages(row: int) -> Callable[[], Balance]:
             """Return what makes the balance of one run."""
-            problems[row].equations.know_rows(system, row, *loads)
-            return partial(scheme.balance, problems[row], old[row], free[row], dt)
+            return lambda: split_balance(whole(), row)
 
         parts |= {
             "problem": problems,

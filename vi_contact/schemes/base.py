@@ -7,19 +7,21 @@ A scheme derives from one family, or is like it:
 - ``BalanceStep``: the contact force stands in the balance of forces at a time; contact nodes should
   have no mass. Newmark, HHT, GeneralisedAlpha, LinearMultistep, Houbolt; Trapezoidal is like it.
 
-Most of them solve for x = u1, the displacement at the end: ``position_step`` poses that step, and
-``end_step`` makes the next state. MoreauJean solves for v1. In all files 0 and 1 are the beginning
-and the end of a step, a bar is a mean over it, and the arguments of the methods are those of
-``core.step.Scheme``, which explains them.
+Most of them solve for x = u1, the displacement at the end: ``position_stage`` makes the stage of
+such a step, and ``end_state`` the next state. MoreauJean solves for v1. In all files 0 and 1 are
+the beginning and the end of a step, a bar is a mean over it, and the arguments of the methods are
+those of ``core.step.Scheme``, which explains them.
 """
 
 import logging
+from collections.abc import Callable, Mapping
 
-from ..core.algebra import Array, EffectiveMatrix, Mask
+from ..core.algebra import Array, Mask
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.protocols import MassLaw
-from ..core.step import Balance, State, StepProblem, StepResult
+from ..core.stage import Affine, Answer, Stage
+from ..core.step import Balance, State
 from ..laws.mass import ConsistentMass, Redistributed
 
 log = logging.getLogger(__name__)
@@ -84,80 +86,77 @@ class BalanceStep:
         check_balance(repr(self), problem)
 
 
-def position_step(
+def position_stage(
     problem: ContactProblem,
     state: State,
-    A: EffectiveMatrix,
     dt: float,
     *,
-    b: Array,
-    scale: float,
-    guess: Array | None = None,
+    guess: Array,
+    u: Affine,
+    v: Affine,
+    a: Affine,
+    load: Array,
+    scale: float = 1.0,
     active: Mask | None = None,
-) -> StepProblem:
-    """Return the step A x = b - … in x = u1, with gap and slip at the end of the step.
+    carried: Array | None = None,
+    weight: float = 1.0,
+    before: Callable[[], Balance] | None = None,
+) -> Stage:
+    """Return the stage of a step in x = u1, with gap and slip at the end of the step.
 
     Args:
         problem: the problem that is marched.
         state: the state at the beginning of the step.
-        A: the effective matrix of this dt.
         dt: size of the step [s].
-        b: right-hand side (n,), ``scale`` times newtons.
-        scale: how many times newtons the reactions of the step are, a pure number.
-        guess: predicted u1 (n,) [m]; None for free flight, u0 + dt v0.
+        guess: predicted u1 (n,) [m].
+        u: displacement at the stage [m].
+        v: velocity at the stage [m/s].
+        a: acceleration at the stage [m/s²].
+        load: mean load (n,) [N].
+        scale: what the balance is multiplied by, a pure number.
         active: predicted contact set (m,); None for that of the state.
+        carried: Bᵀr (n,) [N] of reactions of the beginning; None for none.
+        weight: of this balance in the mean equation of the step.
+        before: makes the balance at the beginning, with the weight 1 - ``weight``; None for none.
 
     Returns:
-        The step: bound is the gap (m,) [m] of the undeformed body at the end, slip is measured from
-        B_t u0 and what the obstacle slides, and slip rates are slips over dt.
+        The stage: bound is the gap (m,) [m] of the undeformed body at the end, slip is measured
+        from B_t u0 and what the obstacle slides, and slip rates are slips over dt.
     """
     end = state.t + dt
-    return StepProblem(
-        A=A,
-        b=b,
-        bound=problem.surface.gap(end),
-        surface=problem.surface,
+    return Stage(
+        guess=guess,
+        u=u,
+        v=v,
+        a=a,
+        load=load,
         scale=scale,
-        guess=state.u + dt * state.v if guess is None else guess,
+        bound=problem.surface.gap(end),
+        slip0=problem.slip_origin(state.u, state.t, end),
         active=state.active if active is None else active,
         t=end,
         k=state.k + 1,
-        friction=problem.friction,
-        slip0=problem.slip_origin(state.u, state.t, end),
         rate_factor=1.0 / dt,
+        carried=carried,
+        weight=weight,
+        before=before,
     )
 
 
-def end_step(step: StepProblem, result: StepResult, u: Array, v: Array) -> State:
-    """Return the state at the end of a step, with the mean reactions r/scale [N] and no memory.
+def end_state(
+    stage: Stage, answer: Answer, u: Array, v: Array, memory: Mapping[str, Array] | None = None
+) -> State:
+    """Return the state at the end of a step, with the reactions [N] of its answer.
 
     Args:
-        step: the step.
-        result: its answer, with reactions (m,) that are ``scale`` times newtons.
+        stage: of the step.
+        answer: its answer.
         u: displacement (n,) [m] at the end.
         v: velocity (n,) [m/s] at the end.
+        memory: what the scheme carries on; None for nothing.
     """
-    r_t = None if result.r_t is None else result.r_t / step.scale
-    return State(step.t, step.k, u, v, result.r_n / step.scale, result.active, r_t=r_t)
-
-
-def balance_means(
-    problem: ContactProblem, old: State, new: State, dt: float, *, u: Array, f: Array
-) -> Balance:
-    """Return the equation of a step with the mean rates of u and v, and the new reactions.
-
-        M (v1 - v0)/dt + C (u1 - u0)/dt + K u = f - B_nᵀ r_n - B_tᵀ r_t
-
-    Args:
-        problem: the problem that is marched.
-        old: the state before the step.
-        new: the state after it.
-        dt: size of the step [s].
-        u: mean displacement (n,) [m] of the scheme.
-        f: mean load (n,) [N] of the scheme.
-    """
-    v, a = problem.equations.rates(old.u, new.u, old.v, new.v, dt)
-    return Balance(u=u, v=v, a=a, f=f, r_n=new.r_n, r_t=new.r_t)
+    kept = {} if memory is None else memory
+    return State(stage.t, stage.k, u, v, answer.r_n, answer.active, kept, answer.r_t)
 
 
 def check_balance(name: str, problem: ContactProblem) -> None:

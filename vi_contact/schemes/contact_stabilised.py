@@ -30,15 +30,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..core.algebra import Array, EffectiveMatrix, Mask
+from ..core.algebra import Array, Mask
 from ..core.arguments import check_fields
 from ..core.errors import StepFailure
 from ..core.problem import ContactProblem
 from ..core.protocols import Frictionless
-from ..core.step import Balance, State, StepProblem, StepResult
+from ..core.stage import Affine, Answer, Stage
+from ..core.step import State, StepProblem
 from ..solvers.automatic import solver_beside_steps
 from ..solvers.certified import TOLERANCE, CertifiedSolver
-from .base import SingleStep, balance_means, end_step, position_step
+from .base import SingleStep, end_state, position_stage
 from .consistent_data import mass_matrix, without_springs
 
 
@@ -57,80 +58,55 @@ class ContactStabilisedNewmark(SingleStep):
     def __post_init__(self) -> None:
         check_fields(self)
 
-    def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
-        """Return A = 4/dt² M + 2/dt C + K."""
-        return problem.equations.effective(m=4.0 / dt**2, c=2.0 / dt, k=1.0, shares=True)
+    def stage(self, problem: ContactProblem, state: State, dt: float) -> Stage:
+        """Return the mean balance of the step, in d = u1 - u_p.
 
-    def step(
-        self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
-    ) -> StepProblem:
-        """Return the step with b of the module's equations.
+        Its means are u = ½ (u0 + u_p + d), v = (u_p - u0 + d)/dt and a = 2 d/dt². The projection
+        adds w = u_p - u0 - dt v0 to the displacement and nothing to the velocity, so that u1 - u0 =
+        ½ dt (v0 + v1) + w: the ledger finds w·M (v1 - v0)/dt as algorithmic loss.
 
         Args:
             problem: the problem that is marched.
             state: u [m] and v [m/s] at t0, (n,) each.
-            A: 4/dt² M + 2/dt C + K (n, n) [N/m].
             dt: size of the step [s].
-
-        Returns:
-            The step in x = u1 [m], with b and reactions twice newtons; its guess is u_p.
 
         Raises:
             StepFailure: the projection cannot be certified.
         """
-        system = problem.equations
-        free = state.u + dt * state.v
-        u_p = free
+        u_p = state.u + dt * state.v
         active = state.active
+        v_p = state.v
         if self.projected:
+            free = u_p
             u_p, active = project_predictor(problem, state, free, dt)
-
-        # M u_p of a free flight is made of products that are known.
-        if u_p is free:
-            Mu = system.product("M", state.u) + dt * system.product("M", state.v)
-        else:
-            Mu = system.M @ u_p
-        f = system.load_at(state.t + 0.5 * dt)
-        b = 2.0 * f + 4.0 / dt**2 * Mu - system.product("K", state.u)
-        if system.C is not None:
-            b += 2.0 / dt * system.product("C", state.u)
-        return position_step(problem, state, A, dt, b=b, scale=2.0, guess=u_p, active=active)
+            if u_p is not free:
+                v_p = (u_p - state.u) / dt
+        return position_stage(
+            problem,
+            state,
+            dt,
+            guess=u_p,
+            u=Affine(0.5 * (state.u + u_p), 0.5),
+            v=Affine(v_p, 1.0 / dt),
+            a=Affine(None, 2.0 / dt**2),
+            load=problem.equations.load_at(state.t + 0.5 * dt),
+            scale=2.0,
+            active=active,
+        )
 
     def finish(
-        self,
-        problem: ContactProblem,
-        state: State,
-        step: StepProblem,
-        result: StepResult,
-        dt: float,
+        self, problem: ContactProblem, state: State, stage: Stage, answer: Answer, dt: float
     ) -> State:
-        """Return the state with v1 = v0 + 2/dt (u1 - u_p).
+        """Return the state with v1 = v0 + 2 d/dt.
 
         Args:
             problem: the problem that is marched; not read.
             state: the state at t0.
-            step: what ``step`` returned for it; its guess is u_p.
-            result: its answer, x = u1 (n,) [m]; the state gets half its reactions [N].
+            stage: what ``stage`` returned for it; its guess is u_p.
+            answer: x = u1 (n,) [m], and the mean reactions [N].
             dt: size of the step [s].
         """
-        v = state.v + 2.0 / dt * (result.x - step.guess)
-        return end_step(step, result, result.x, v)
-
-    def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the averages of the module's equation.
-
-        The projection adds w = u_p - u0 - dt v0 to the displacement and nothing to the velocity, so
-        that u1 - u0 = ½ dt (v0 + v1) + w. The ledger finds w·M (v1 - v0)/dt as algorithmic loss.
-
-        Args:
-            problem: the problem that is marched.
-            old: the state at t0.
-            new: the state at t1, before the impact law.
-            dt: size of the step [s].
-        """
-        u = 0.5 * (old.u + new.u)
-        f = problem.equations.load_at(old.t + 0.5 * dt)
-        return balance_means(problem, old, new, dt, u=u, f=f)
+        return end_state(stage, answer, answer.x, state.v + 2.0 / dt * answer.d)
 
 
 def project_predictor(

@@ -29,19 +29,21 @@ Newmark. Source: Chung and Hulbert, J. Appl. Mech. 60 (1993) 371-375.
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
 
 import numpy as np
 
-from ..core.algebra import Array, EffectiveMatrix
+from ..core.algebra import Array
 from ..core.arguments import check_arguments
 from ..core.checks import quote, real
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.quantities import Between
-from ..core.step import Balance, State, StepProblem, StepResult
-from .base import BalanceStep, position_step
+from ..core.stage import Affine, Answer, Stage
+from ..core.step import Balance, State
+from .base import BalanceStep, end_state, position_stage
 from .consistent_data import consistent_acceleration, equilibrate, replace_massless
 
 SLACK = 1e-12  # round-off in the conditions of stability
@@ -97,128 +99,113 @@ class AlphaStep(BalanceStep, ABC):
         owner = self._owner_of_memory(state.t)
         return replace(state, memory={"a": a, "reaction": reaction, "of": owner})
 
-    def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
-        """Return A of the module's equations."""
-        w = self.weights
-        inertia = (1.0 - w.alpha_m) / ((1.0 - w.alpha_f) * w.beta * dt**2)
-        return problem.equations.effective(m=inertia, c=w.gamma / (w.beta * dt), k=1.0)
+    def stage(self, problem: ContactProblem, state: State, dt: float) -> Stage:
+        """Return the balance of the module, divided by 1 - alpha_f, in d = beta dt² a1.
 
-    def _compute_rates_at_zero(self, state: State, dt: float) -> tuple[Array, Array]:
-        """Return v1 [m/s] and a1 [m/s²] for u1 = 0: what the state before the step fixes of them.
+        With the predictors of Newmark's method, which have a1 = 0,
 
-        For any u1 they are  v1 + gamma/(beta dt) u1  and  a1 + u1/(beta dt²).
-        """
-        w = self.weights
-        a0 = state.memory["a"]
-        a = (w.beta - 0.5) / w.beta * a0 - (state.u + dt * state.v) / (w.beta * dt**2)
-        v = state.v + dt * ((1.0 - w.gamma) * a0 + w.gamma * a)
-        return v, a
-
-    def step(
-        self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
-    ) -> StepProblem:
-        """Return the step with b of the equation at u1 = 0.
-
-        b = f1 - C v1 - (M a_m - alpha_f (f0 - C v0 - K u0 - Bᵀr0))/(1 - alpha_f).
+            u1 = u_p + d,    v1 = v_p + gamma d/(beta dt),    a1 = d/(beta dt²)
 
         Args:
             problem: the problem that is marched.
             state: u [m], v [m/s], "a" [m/s²] and "reaction" [N] at t0, (n,), or rows (k, n) of
                 several runs.
-            A: that of the module's equations (n, n) [N/m].
             dt: size of the step [s].
-
-        Returns:
-            The step in x = u1 [m], with b and reactions in newtons.
         """
         system = problem.equations
         w = self.weights
-        v, a = self._compute_rates_at_zero(state, dt)
-        mean = ((1.0 - w.alpha_m) * a + w.alpha_m * state.memory["a"]) / (1.0 - w.alpha_f)
-        b = system.load_at(state.t + dt) - system.M @ mean
+        a0 = state.memory["a"]
+        u = state.u + dt * state.v + (0.5 - w.beta) * dt**2 * a0
+        guess = u
+        v = state.v + (1.0 - w.gamma) * dt * a0
+        load = system.load_at(state.t + dt)
+        carried = None
 
         # The share of the old forces; Newmark's member has none, and saves the products.
         if w.alpha_f != 0.0:
             ratio = w.alpha_f / (1.0 - w.alpha_f)
-            f0 = system.load_at(state.t)
-            b += ratio * (f0 - system.product("K", state.u) - state.memory["reaction"])
+            u = u + ratio * state.u
             v = v + ratio * state.v
-        if system.C is not None:
-            b -= system.C @ v
-        return position_step(problem, state, A, dt, b=b, scale=1.0)
+            load = load + ratio * system.load_at(state.t)
+            carried = ratio * state.memory["reaction"]
+        a = None
+        if w.alpha_m != 0.0:
+            a = w.alpha_m / (1.0 - w.alpha_f) * a0
+        return position_stage(
+            problem,
+            state,
+            dt,
+            guess=guess,
+            u=Affine(u, 1.0),
+            v=Affine(v, w.gamma / (w.beta * dt)),
+            a=Affine(a, (1.0 - w.alpha_m) / ((1.0 - w.alpha_f) * w.beta * dt**2)),
+            load=load,
+            carried=carried,
+            weight=self._weigh_end(),
+            before=self._look_back(problem, state),
+        )
+
+    def _weigh_end(self) -> float:
+        """Return the weight of the stage in the mean equation of a step."""
+        return 1.0 - self.weights.alpha_f
+
+    def _look_back(self, problem: ContactProblem, state: State) -> Callable[[], Balance] | None:
+        """Return what makes the balance at the beginning, for the mean equation of a step.
+
+        None: the stage holds what there is of it.
+
+        Args:
+            problem: the problem that is marched; not read.
+            state: at t0; not read.
+        """
+        return None
 
     def finish(
-        self,
-        problem: ContactProblem,
-        state: State,
-        step: StepProblem,
-        result: StepResult,
-        dt: float,
+        self, problem: ContactProblem, state: State, stage: Stage, answer: Answer, dt: float
     ) -> State:
-        """Return the state with a1 and v1 from u1.
+        """Return the state with a1 and v1 from d.
 
         Massless unknowns get no acceleration and the mean velocity of the step.
 
         Args:
             problem: the problem that is marched.
             state: the state at t0.
-            step: what ``step`` returned for it.
-            result: its answer, x = u1 (n,) [m] and reactions at the end [N].
+            stage: what ``stage`` returned for it.
+            answer: x = u1 (n,) [m], and the reactions at the end [N].
             dt: size of the step [s].
         """
         w = self.weights
-        v, a = self._compute_rates_at_zero(state, dt)
-        v += w.gamma / (w.beta * dt) * result.x
-        a += result.x / (w.beta * dt**2)
-        v = replace_massless(problem, v, (result.x - state.u) / dt)
+        a = answer.d / (w.beta * dt**2)
+        v = state.v + dt * ((1.0 - w.gamma) * state.memory["a"] + w.gamma * a)
+        v = replace_massless(problem, v, (answer.x - state.u) / dt)
         memory = {
             "a": replace_massless(problem, a, 0.0),
-            "reaction": problem.surface.reaction_load(result.r_n, v.shape[-1], result.r_t),
-            "of": self._owner_of_memory(step.t),
+            "reaction": problem.surface.reaction_load(answer.r_n, v.shape[-1], answer.r_t),
+            "of": self._owner_of_memory(stage.t),
         }
-        return State(step.t, step.k, result.x, v, result.r_n, result.active, memory, result.r_t)
-
-    def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the step's own equation of motion: M a_m + C v_f + K u_f = f_f - Bᵀr_f.
-
-        Args:
-            problem: the problem that is marched.
-            old: the state at t0.
-            new: the state at t1, before the impact law.
-            dt: size of the step [s]; not read.
-        """
-        return balance_ends(problem, old, new, self.weights.alpha_m, self.weights.alpha_f)
+        return end_state(stage, answer, answer.x, v, memory)
 
 
-def balance_ends(
-    problem: ContactProblem, old: State, new: State, m: float, f: float, level: str = ""
-) -> Balance:
-    """Return the equation of a step with weighted means of its ends.
+def balance_at(problem: ContactProblem, state: State, level: str = "") -> Balance:
+    """Return the balance of forces at a state whose acceleration is known.
+
+    The reactions come from its memory: after an impact they fit the new velocity, and those of the
+    state itself do not.
 
     Args:
         problem: the problem that is marched.
-        old: the state before the step.
-        new: the state after it.
-        m: weight of the old acceleration; the new one has 1 - m.
-        f: weight of all else at the old end; the new end has 1 - f.
-        level: how the names "a" and "reaction" end in the memory of the states: "_0" in that of
-            ``LinearMultistep``.
+        state: with "a" and "reaction" in its memory.
+        level: how these names end there: "_0" in the memory of ``LinearMultistep``.
     """
-    # The old reactions come from the memory: after an impact they fit the new velocity, and those
-    # of the state itself do not.
-    load_at = problem.equations.load_at
     surface = problem.surface
-    reaction = old.memory[f"reaction{level}"]
-    r_t = None
-    if new.r_t is not None:
-        r_t = (1.0 - f) * new.r_t + f * surface.tangential_values(reaction)
+    reaction = state.memory[f"reaction{level}"]
     return Balance(
-        u=(1.0 - f) * new.u + f * old.u,
-        v=(1.0 - f) * new.v + f * old.v,
-        a=(1.0 - m) * new.memory[f"a{level}"] + m * old.memory[f"a{level}"],
-        f=(1.0 - f) * load_at(new.t) + f * load_at(old.t),
-        r_n=(1.0 - f) * new.r_n + f * surface.normal_values(reaction),
-        r_t=r_t,
+        u=state.u,
+        v=state.v,
+        a=state.memory[f"a{level}"],
+        f=problem.equations.load_at(state.t),
+        r_n=surface.normal_values(reaction),
+        r_t=surface.tangential_values(reaction) if problem.frictional else None,
     )
 
 

@@ -22,20 +22,22 @@ Impulses: those over a contact with free flight before and after are the change 
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Annotated, ClassVar
 
 import numpy as np
 
-from ..core.algebra import Array, EffectiveMatrix
+from ..core.algebra import Array
 from ..core.arguments import check_fields
 from ..core.checks import array, number
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.quantities import RATIO, Finite
-from ..core.step import Balance, State, StepProblem, StepResult
-from .base import BalanceStep, position_step
+from ..core.stage import Affine, Answer, Stage
+from ..core.step import State
+from .base import BalanceStep, end_state, position_stage
 from .consistent_data import consistent_acceleration, equilibrate, replace_massless
-from .generalised_alpha import balance_ends
+from .generalised_alpha import balance_at
 
 FREQUENCIES = np.logspace(-2.0, 3.0, 61)  # natural frequency times dt, for the stability check
 DAMPING = (0.0, 0.1, 1.0)  # damping ratios, for the stability check
@@ -207,11 +209,6 @@ class LinearMultistep(BalanceStep):
             past[f"a_{r}"] = a
         return replace(state, memory=past)
 
-    def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
-        """Return A of the module's equations."""
-        dv_du, da_du = self._differentiate_rates(dt)
-        return problem.equations.effective(m=da_du, c=dv_du, k=1.0)
-
     def _collect_levels(self, state: State) -> dict[str, Array]:
         """Return u, v and a at the q levels before the step, of which 1 is the newest.
 
@@ -240,35 +237,35 @@ class LinearMultistep(BalanceStep):
             a += self.gamma[r] * levels[f"u_{r}"] - self.mu * dt**2 * self.b[r] * levels[f"a_{r}"]
         return v / (dt * self.b[0]), a / (self.mu * dt**2 * self.b[0])
 
-    def step(
-        self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
-    ) -> StepProblem:
-        """Return the step with b = f(t_p) - M a - C v, the rates for u(p) = 0.
+    def stage(self, problem: ContactProblem, state: State, dt: float) -> Stage:
+        """Return the balance at t_p, in d = u(p) - u0 - dt v0.
+
+        The ledger takes the mean of the balances at both ends.
 
         Args:
             problem: the problem that is marched.
             state: u [m], v [m/s] and the past in its memory at t0, (n,), or rows (k, n) of several
                 runs.
-            A: that of the module's equations (n, n) [N/m].
             dt: size of the step [s], the distance of the levels.
-
-        Returns:
-            The step in x = u(p) [m], with b and reactions in newtons.
         """
-        system = problem.equations
-        v, a = self._compute_rates_at_zero(self._collect_levels(state), dt)
-        b = system.load_at(state.t + dt) - system.M @ a
-        if system.C is not None:
-            b -= system.C @ v
-        return position_step(problem, state, A, dt, b=b, scale=1.0)
+        guess = state.u + dt * state.v
+        v_at_zero, a_at_zero = self._compute_rates_at_zero(self._collect_levels(state), dt)
+        dv_du, da_du = self._differentiate_rates(dt)
+        return position_stage(
+            problem,
+            state,
+            dt,
+            guess=guess,
+            u=Affine(guess, 1.0),
+            v=Affine(v_at_zero + dv_du * guess, dv_du),
+            a=Affine(a_at_zero + da_du * guess, da_du),
+            load=problem.equations.load_at(state.t + dt),
+            weight=0.5,
+            before=partial(balance_at, problem, state, "_0"),
+        )
 
     def finish(
-        self,
-        problem: ContactProblem,
-        state: State,
-        step: StepProblem,
-        result: StepResult,
-        dt: float,
+        self, problem: ContactProblem, state: State, stage: Stage, answer: Answer, dt: float
     ) -> State:
         """Return the state with velocity and acceleration from eqs. 11c,d, its levels one older.
 
@@ -277,32 +274,17 @@ class LinearMultistep(BalanceStep):
         Args:
             problem: the problem that is marched.
             state: the state at t0.
-            step: what ``step`` returned for it.
-            result: its answer, x = u(p) (n,) [m] and reactions at the end [N].
+            stage: what ``stage`` returned for it; its rates are those of eqs. 11c,d.
+            answer: x = u(p) (n,) [m], and the reactions at the end [N].
             dt: size of the step [s].
         """
-        levels = self._collect_levels(state)
-        v_at_zero, a_at_zero = self._compute_rates_at_zero(levels, dt)
-        dv_du, da_du = self._differentiate_rates(dt)
-        mean = (result.x - state.u) / dt
-        v = replace_massless(problem, v_at_zero + dv_du * result.x, mean)
-        a = replace_massless(problem, a_at_zero + da_du * result.x, 0.0)
+        v = replace_massless(problem, stage.v(answer.d), (answer.x - state.u) / dt)
+        a = replace_massless(problem, stage.a(answer.d), 0.0)
         memory = {
-            **levels,
+            **self._collect_levels(state),
             "a_0": a,
-            "reaction_0": problem.surface.reaction_load(result.r_n, v.shape[-1], result.r_t),
+            "reaction_0": problem.surface.reaction_load(answer.r_n, v.shape[-1], answer.r_t),
             "dt": state.memory["dt"],
-            "t": np.array([step.t]),
+            "t": np.array([stage.t]),
         }
-        return State(step.t, step.k, result.x, v, result.r_n, result.active, memory, result.r_t)
-
-    def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the mean of the equations of motion at both ends, the old one after its impact.
-
-        Args:
-            problem: the problem that is marched.
-            old: the state at t0.
-            new: the state at t1, before the impact law.
-            dt: size of the step [s]; not read.
-        """
-        return balance_ends(problem, old, new, 0.5, 0.5, "_0")
+        return end_state(stage, answer, answer.x, v, memory)

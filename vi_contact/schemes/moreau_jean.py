@@ -34,13 +34,14 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from ..core.algebra import Array, EffectiveMatrix, largest, max_abs
+from ..core.algebra import Array, largest, max_abs
 from ..core.arguments import check_fields
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.quantities import RATIO, Between
-from ..core.step import Balance, State, StepProblem, StepResult
-from .base import SingleStep, balance_means, end_step
+from ..core.stage import Affine, Answer, Stage
+from ..core.step import State
+from .base import SingleStep, end_state
 from .consistent_data import ROUND_OFF
 
 SLACK = 1e-12  # round-off in the largest theta
@@ -97,12 +98,6 @@ class MoreauJean(SingleStep):
                 "initial gap: let them start on the obstacle, or use another scheme"
             )
 
-    def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
-        """Return A = M + theta dt C + theta² dt² K."""
-        return problem.equations.effective(
-            m=1.0, c=self.theta * dt, k=(self.theta * dt) ** 2, shares=True
-        )
-
     def _mean_load(self, problem: ContactProblem, t: float, dt: float) -> Array:
         """Return f_θ = (1 - theta) f(t) + theta f(t + dt), (n,) [N]."""
         load_at = problem.equations.load_at
@@ -127,30 +122,21 @@ class MoreauJean(SingleStep):
         restitution = np.where(v_n < 0.0, separating, -self.e)
         return obstacle + np.where(surface.bilateral, 0.0, restitution * v_n)
 
-    def step(
-        self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
-    ) -> StepProblem:
-        """Return the step in x = v1.
+    def stage(self, problem: ContactProblem, state: State, dt: float) -> Stage:
+        """Return the mean balance of the step, in d = v1 - v0.
 
-        b = M v0 + dt (f_θ - K (u0 + theta (1 - theta) dt v0) - (1 - theta) C v0).
+        Its means are u = u0 + theta dt (v0 + theta d), v = v0 + theta d and a = d/dt.
 
         Args:
             problem: the problem that is marched.
             state: u [m] and v [m/s] at t0, (n,) each.
-            A: M + theta dt C + theta² dt² K (n, n) [kg].
             dt: size of the step [s].
 
         Returns:
-            The step in x = v1 [m/s], with b and reactions in N s; ``bound`` holds normal velocities
+            The stage in x = v1 [m/s], with reactions in N s; ``bound`` holds normal velocities
             (m,) [m/s], infinite on open points.
         """
-        system = problem.equations
         surface = problem.surface
-        rest = 1.0 - self.theta
-        force = self._mean_load(problem, state.t, dt) - system.product("K", state.u)
-        force -= self.theta * rest * dt * system.product("K", state.v)
-        if system.C is not None:
-            force -= rest * system.product("C", state.v)
 
         # Points are closed that would be in the obstacle in the middle of the step if nothing
         # stopped them, and held points.
@@ -162,50 +148,33 @@ class MoreauJean(SingleStep):
         # The slip rate is the tangential velocity relative to the obstacle.
         sliding = surface.sliding(state.t, state.t + dt)
         slip0 = np.zeros(surface.tangents.shape) if sliding is None else sliding / dt
-        return StepProblem(
-            A=A,
-            b=system.product("M", state.v) + dt * force,
-            bound=np.where(closed, self._bound(problem, state, dt), np.inf),
-            surface=surface,
-            scale=dt,
+        way = self.theta * dt
+        return Stage(
             guess=state.v,
+            u=Affine(state.u + way * state.v, way * self.theta),
+            v=Affine(state.v, self.theta),
+            a=Affine(None, 1.0 / dt),
+            load=self._mean_load(problem, state.t, dt),
+            scale=dt,
+            bound=np.where(closed, self._bound(problem, state, dt), np.inf),
+            slip0=slip0 if problem.frictional else None,
             active=closed,
             t=state.t + dt,
             k=state.k + 1,
-            friction=problem.friction,
-            slip0=slip0 if problem.frictional else None,
             rate_factor=1.0,
         )
 
     def finish(
-        self,
-        problem: ContactProblem,
-        state: State,
-        step: StepProblem,
-        result: StepResult,
-        dt: float,
+        self, problem: ContactProblem, state: State, stage: Stage, answer: Answer, dt: float
     ) -> State:
-        """Return the state with u1 = u0 + dt v_θ.
+        """Return the state with u1 = u0 + dt (v0 + theta d).
 
         Args:
             problem: the problem that is marched; not read.
             state: the state at t0.
-            step: what ``step`` returned for it.
-            result: its answer, x = v1 (n,) [m/s]; the state gets its impulses [N s] over dt.
+            stage: what ``stage`` returned for it.
+            answer: x = v1 (n,) [m/s], and the impulses over dt [N].
             dt: size of the step [s].
         """
-        u = state.u + dt * ((1.0 - self.theta) * state.v + self.theta * result.x)
-        return end_step(step, result, u, result.x)
-
-    def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the averages of the module's equation, divided by dt.
-
-        Args:
-            problem: the problem that is marched.
-            old: the state at t0.
-            new: the state at t1, whose reactions are means over the step.
-            dt: size of the step [s].
-        """
-        u = old.u + self.theta * (new.u - old.u)
-        f = self._mean_load(problem, old.t, dt)
-        return balance_means(problem, old, new, dt, u=u, f=f)
+        u = state.u + dt * (state.v + self.theta * answer.d)
+        return end_state(stage, answer, u, answer.x)

@@ -21,12 +21,13 @@ momentum in every step; the ledger uses these means. Source: Newmark, J. Eng. Me
 (1959) 67-94; Krenk, Comput. Methods Appl. Mech. Eng. 195 (2006) 6110-6124.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 from ..core.problem import ContactProblem
 from ..core.step import Balance, State
-from .generalised_alpha import AlphaStep, GeneralisedAlpha, balance_ends
+from .generalised_alpha import AlphaStep, GeneralisedAlpha, balance_at
 
 
 @dataclass(frozen=True)
@@ -49,16 +50,15 @@ class Newmark(AlphaStep):
         """Return the member of generalised-alpha that the scheme is."""
         return GeneralisedAlpha(0.0, 0.0, self.beta, self.gamma)
 
-    def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the equations of both ends, weighted so that M a dt is the change of momentum.
+    def _weigh_end(self) -> float:
+        """Return gamma: with these weights M a dt is the change of momentum."""
+        return self.gamma
 
-        The weights are 1 - gamma at the beginning and gamma at the end, of forces and accelerations
-        alike.
+    def _look_back(self, problem: ContactProblem, state: State) -> Callable[[], Balance]:
+        """Return what makes the balance at the beginning, whose weight is 1 - gamma.
 
         Args:
             problem: the problem that is marched.
-            old: the state at t0, with "a" and "reaction" in its memory.
-            new: the state at t1, before the impact law.
-            dt: size of the step [s]; not read.
+            state: at t0, with "a" and "reaction" in its memory.
         """
-        return balance_ends(problem, old, new, 1.0 - self.gamma, 1.0 - self.gamma)
+        return partial(balance_at, problem, state)

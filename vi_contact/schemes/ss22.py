@@ -13,17 +13,17 @@ dissipates for theta1 > ½.
 Source: Zienkiewicz, Wood and Taylor, in the form with two weights: docs/reference/sources.md [2].
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from ..core.algebra import EffectiveMatrix
 from ..core.checks import quote, real
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
-from ..core.step import Balance, State, StepProblem, StepResult
-from .base import SingleStep, balance_means, end_step, position_step
+from ..core.stage import Affine, Answer, Stage
+from ..core.step import State
+from .base import SingleStep, end_state, position_stage
 
 
 @dataclass(frozen=True)
@@ -49,69 +49,39 @@ class SS22(SingleStep):
                 "theta2 >= theta1 >= 0.5, the unconditionally stable range"
             )
 
-    def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
-        """Return A = 2/(theta2 dt²) M + 2 theta1/(theta2 dt) C + K."""
-        m = 2.0 / (self.theta2 * dt**2)
-        c = 2.0 * self.theta1 / (self.theta2 * dt)
-        return problem.equations.effective(m=m, c=c, k=1.0)
+    def stage(self, problem: ContactProblem, state: State, dt: float) -> Stage:
+        """Return the weighted residual, in d = u1 - u0 - dt v0 = ½ dt² alpha.
 
-    def step(
-        self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
-    ) -> StepProblem:
-        """Return the step with b = A (u0 + dt v0) + (f - C v0 - K (u0 + theta1 dt v0))/theta2.
+        Its means are u = u0 + theta1 dt v0 + theta2 d, v = v0 + 2 theta1 d/dt and a = 2 d/dt².
 
         Args:
             problem: the problem that is marched.
             state: u [m] and v [m/s] at t0, (n,), or rows (k, n) of several runs.
-            A: 2/(theta2 dt²) M + 2 theta1/(theta2 dt) C + K (n, n) [N/m].
             dt: size of the step [s].
-
-        Returns:
-            The step in x = u1 [m], with b and reactions 1/theta2 times newtons.
         """
-        system = problem.equations
-
-        # The equation is one for alpha = 2 (u1 - guess)/dt², where guess is free flight. A times
-        # u1 - guess balances, over theta2, what is left of the forces there.
-        guess = state.u + dt * state.v
-        u_mean = state.u + self.theta1 * dt * state.v
-        force = system.load_at(state.t + self.theta1 * dt) - system.K @ u_mean
-        if system.C is not None:
-            force -= system.C @ state.v
-        b = A @ guess + force / self.theta2
-        return position_step(problem, state, A, dt, b=b, scale=1.0 / self.theta2, guess=guess)
+        way = dt * state.v
+        return position_stage(
+            problem,
+            state,
+            dt,
+            guess=state.u + way,
+            u=Affine(state.u + self.theta1 * way, self.theta2),
+            v=Affine(state.v, 2.0 * self.theta1 / dt),
+            a=Affine(None, 2.0 / dt**2),
+            load=problem.equations.load_at(state.t + self.theta1 * dt),
+            scale=1.0 / self.theta2,
+        )
 
     def finish(
-        self,
-        problem: ContactProblem,
-        state: State,
-        step: StepProblem,
-        result: StepResult,
-        dt: float,
+        self, problem: ContactProblem, state: State, stage: Stage, answer: Answer, dt: float
     ) -> State:
-        """Return the state with alpha = 2 (u1 - u0 - dt v0)/dt², v1 = v0 + dt alpha.
+        """Return the state with v1 = v0 + dt alpha = v0 + 2 d/dt.
 
         Args:
             problem: the problem that is marched; not read.
             state: the state at t0.
-            step: what ``step`` returned for it; its guess is u0 + dt v0.
-            result: its answer, x = u1 (n,) [m]; the state gets theta2 times its reactions [N].
+            stage: what ``stage`` returned for it.
+            answer: x = u1 (n,) [m], and the mean reactions [N].
             dt: size of the step [s].
         """
-        v = state.v + 2.0 * (result.x - step.guess) / dt
-        return end_step(step, result, result.x, v)
-
-    def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the averages of the residual equation, with the mean values of tau and tau².
-
-        Args:
-            problem: the problem that is marched.
-            old: the state at t0.
-            new: the state at t1, before the impact law.
-            dt: size of the step [s].
-        """
-        alpha = (new.v - old.v) / dt
-        u = old.u + self.theta1 * dt * old.v + 0.5 * self.theta2 * dt**2 * alpha
-        f = problem.equations.load_at(old.t + self.theta1 * dt)
-        balance = balance_means(problem, old, new, dt, u=u, f=f)
-        return replace(balance, v=old.v + self.theta1 * dt * alpha)
+        return end_state(stage, answer, answer.x, state.v + 2.0 / dt * answer.d)

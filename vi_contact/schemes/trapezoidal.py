@@ -19,22 +19,27 @@ Eur. J. Mech. A 27 (2008) 918-932.
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
-from ..core.algebra import Array, EffectiveMatrix
+import numpy as np
+
+from ..core.algebra import Array
 from ..core.checks import provides
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.protocols import MassLaw
-from ..core.step import Balance, State, StepProblem, StepResult
+from ..core.stage import Affine, Answer, Stage
+from ..core.step import State
 from ..laws.mass import Redistributed
-from .base import balance_means, check_balance, end_step, position_step
+from .base import check_balance, end_state, position_stage
 from .consistent_data import equilibrate, replace_massless
+
+STARTED = {"started": np.ones(1)}  # the memory of a state that massless nodes are at rest in
 
 
 @dataclass(frozen=True)
 class Trapezoidal:
     """Step by the module's equations.
 
-    The memory of its states is "force", f - K u - Bᵀr (n,) [N].
+    The memory of its states is "started": their massless nodes are in equilibrium.
 
     Attributes:
         mass: the mass law for problems that do not name one.
@@ -67,19 +72,12 @@ class Trapezoidal:
 
         Args:
             problem: the problem that is marched.
-            state: the state to go on from; "force" in its memory says that it has been started.
+            state: the state to go on from; "started" in its memory says that it has been started.
             dt: size of the next steps [s]; not read, as no memory depends on it.
         """
-        if "force" in state.memory:
+        if "started" in state.memory:
             return state
-        return self._remember_force(problem, equilibrate(problem, state))
-
-    def _remember_force(self, problem: ContactProblem, state: State) -> State:
-        """Return the state with f - K u - Bᵀr in its memory: the next step starts with it."""
-        system = problem.equations
-        reaction = problem.surface.reaction_load(state.r_n, system.rows, state.r_t)
-        force = system.load_at(state.t) - system.product("K", state.u) - reaction
-        return replace(state, memory={"force": force})
+        return replace(equilibrate(problem, state), memory=STARTED)
 
     def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
         """Return the state with the new velocity; forces do not depend on it.
@@ -92,72 +90,47 @@ class Trapezoidal:
         """
         return state.with_velocity(v)
 
-    def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
-        """Return A = 4/dt² M + 2/dt C + K."""
-        return problem.equations.effective(m=4.0 / dt**2, c=2.0 / dt, k=1.0, shares=True)
+    def stage(self, problem: ContactProblem, state: State, dt: float) -> Stage:
+        """Return the sum of the balances of both ends, in d = u1 - u0 - dt v0.
 
-    def step(
-        self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
-    ) -> StepProblem:
-        """Return the step with b of the module's equations.
+        u0 + u1 = 2 u0 + dt v0 + d,  v0 + v1 = 2 v0 + 2 d/dt,  a0 + a1 = 4 d/dt²; the reactions of
+        the beginning are known. Half of it is the mean equation of the step.
 
         Args:
             problem: the problem that is marched.
-            state: u [m], v [m/s] and "force" [N] at t0, (n,), or rows (k, n) of several runs.
-            A: 4/dt² M + 2/dt C + K (n, n) [N/m].
+            state: u [m], v [m/s] and reactions [N] at t0, (n,) and (m,), or rows of several runs.
             dt: size of the step [s].
-
-        Returns:
-            The step in x = u1 [m], with b and reactions in newtons.
         """
         system = problem.equations
-
-        # The memory holds f0 - K u0 - Bᵀr0. What is left of b are products with M and C, and f1.
-        b = state.memory["force"] + system.load_at(state.t + dt)
-        b += 4.0 / dt**2 * (system.product("M", state.u) + dt * system.product("M", state.v))
-        if system.C is not None:
-            b += 2.0 / dt * system.product("C", state.u)
-        return position_step(problem, state, A, dt, b=b, scale=1.0)
+        way = dt * state.v
+        guess = state.u + way
+        return position_stage(
+            problem,
+            state,
+            dt,
+            guess=guess,
+            u=Affine(state.u + guess, 1.0),
+            v=Affine(2.0 * state.v, 2.0 / dt),
+            a=Affine(None, 4.0 / dt**2),
+            load=system.load_at(state.t) + system.load_at(state.t + dt),
+            carried=problem.surface.reaction_load(state.r_n, state.u.shape[-1], state.r_t),
+            weight=0.5,
+        )
 
     def finish(
-        self,
-        problem: ContactProblem,
-        state: State,
-        step: StepProblem,
-        result: StepResult,
-        dt: float,
+        self, problem: ContactProblem, state: State, stage: Stage, answer: Answer, dt: float
     ) -> State:
-        """Return the state with v1 = 2 (u1 - u0)/dt - v0.
+        """Return the state with v1 = v0 + 2 d/dt.
 
         Massless unknowns get the mean velocity of the step.
 
         Args:
             problem: the problem that is marched.
             state: the state at t0.
-            step: what ``step`` returned for it.
-            result: its answer, x = u1 (n,) [m] and reactions at the end [N].
+            stage: what ``stage`` returned for it.
+            answer: x = u1 (n,) [m], and the reactions at the end [N].
             dt: size of the step [s].
         """
-        mean = (result.x - state.u) / dt
-        v = replace_massless(problem, 2.0 / dt * (result.x - state.u) - state.v, mean)
-        return self._remember_force(problem, end_step(step, result, result.x, v))
-
-    def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the means of both ends.
-
-        Args:
-            problem: the problem that is marched.
-            old: the state at t0.
-            new: the state at t1, before the impact law.
-            dt: size of the step [s].
-        """
-        load_at = problem.equations.load_at
-        u = 0.5 * (old.u + new.u)
-        f = 0.5 * (load_at(old.t) + load_at(new.t))
-        balance = balance_means(problem, old, new, dt, u=u, f=f)
-
-        # A first state may have no tangential reactions yet: they count as zero.
-        r_t = None
-        if new.r_t is not None:
-            r_t = 0.5 * (new.r_t if old.r_t is None else old.r_t + new.r_t)
-        return replace(balance, r_n=0.5 * (old.r_n + new.r_n), r_t=r_t)
+        rate = answer.d / dt
+        v = replace_massless(problem, state.v + 2.0 * rate, state.v + rate)
+        return end_state(stage, answer, answer.x, v, STARTED)

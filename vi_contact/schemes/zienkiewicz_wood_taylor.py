@@ -18,12 +18,12 @@ accelerations are stored, so nothing restarts after an impact.
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
-from ..core.algebra import Array, EffectiveMatrix
 from ..core.arguments import check_fields
 from ..core.problem import ContactProblem
 from ..core.quantities import Between
-from ..core.step import Balance, State, StepProblem, StepResult
-from .base import SingleStep, balance_means, end_step, position_step
+from ..core.stage import Affine, Answer, Stage
+from ..core.step import State
+from .base import SingleStep, end_state, position_stage
 
 
 @dataclass(frozen=True)
@@ -43,70 +43,41 @@ class ZienkiewiczWoodTaylor(SingleStep):
     def __post_init__(self) -> None:
         check_fields(self)
 
-    def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
-        """Return A = M/(phi dt)² + C/(phi dt) + K."""
-        return problem.equations.effective(
-            m=1.0 / (self.phi * dt) ** 2, c=1.0 / (self.phi * dt), k=1.0, shares=True
-        )
+    def stage(self, problem: ContactProblem, state: State, dt: float) -> Stage:
+        """Return the balance at t0 + phi dt, in d = u1 - u0 - dt v0.
 
-    def _mean_load(self, problem: ContactProblem, state: State, dt: float) -> Array:
-        """Return f (n,) [N] at t0 + phi dt."""
-        return problem.equations.load_at(state.t + self.phi * dt)
-
-    def step(
-        self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
-    ) -> StepProblem:
-        """Return the step in x = u1.
-
-        b = f/phi + M (u0 + dt v0)/(phi dt)² + C u0/(phi dt) - (1 - phi)/phi K u0.
+        There u = u0 + phi (dt v0 + d), v = v0 + d/dt and a = d/(phi dt²).
 
         Args:
             problem: the problem that is marched.
             state: u [m] and v [m/s] at t0, (n,), or rows (k, n) of several runs.
-            A: M/(phi dt)² + C/(phi dt) + K (n, n) [N/m].
             dt: size of the step [s].
-
-        Returns:
-            The step in x = u1 [m], with b and reactions 1/phi times newtons.
         """
-        system = problem.equations
         phi = self.phi
-        b = self._mean_load(problem, state, dt) / phi
-        b += (system.product("M", state.u) + dt * system.product("M", state.v)) / (phi * dt) ** 2
-        b -= (1.0 - phi) / phi * system.product("K", state.u)
-        if system.C is not None:
-            b += system.product("C", state.u) / (phi * dt)
-        return position_step(problem, state, A, dt, b=b, scale=1.0 / phi)
+        way = dt * state.v
+        return position_stage(
+            problem,
+            state,
+            dt,
+            guess=state.u + way,
+            u=Affine(state.u + phi * way, phi),
+            v=Affine(state.v, 1.0 / dt),
+            a=Affine(None, 1.0 / (phi * dt**2)),
+            load=problem.equations.load_at(state.t + phi * dt),
+            scale=1.0 / phi,
+        )
 
     def finish(
-        self,
-        problem: ContactProblem,
-        state: State,
-        step: StepProblem,
-        result: StepResult,
-        dt: float,
+        self, problem: ContactProblem, state: State, stage: Stage, answer: Answer, dt: float
     ) -> State:
-        """Return the state with v1 = v0 + ((u1 - u0)/dt - v0)/phi.
+        """Return the state with v1 = v0 + d/(phi dt).
 
         Args:
             problem: the problem that is marched; not read.
             state: the state at t0.
-            step: what ``step`` returned for it.
-            result: its answer, x = u1 (n,) [m]; the state gets phi times its reactions [N].
+            stage: what ``stage`` returned for it.
+            answer: x = u1 (n,) [m], and the mean reactions [N].
             dt: size of the step [s].
         """
-        v = state.v + ((result.x - state.u) / dt - state.v) / self.phi
-        return end_step(step, result, result.x, v)
-
-    def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
-        """Return the averages of the module's equation, at t0 + phi dt.
-
-        Args:
-            problem: the problem that is marched.
-            old: the state at t0.
-            new: the state at t1, before the impact law.
-            dt: size of the step [s].
-        """
-        u = old.u + self.phi * (new.u - old.u)
-        f = self._mean_load(problem, old, dt)
-        return balance_means(problem, old, new, dt, u=u, f=f)
+        v = state.v + answer.d / (self.phi * dt)
+        return end_state(stage, answer, answer.x, v)

@@ -95,7 +95,7 @@ def pose_remainder(step: StepProblem, answer: StepResult, share: float) -> StepP
             friction = Share(friction, share)
     return replace(
         step,
-        b=step.b - step.A.image(x) - surface.reaction_load(r_n, len(x), r_t),
+        b=step.b - step.A @ x - surface.reaction_load(r_n, len(x), r_t),
         bound=step.bound - surface.normal_values(x) + surface.compliance * r_n / step.scale,
         guess=np.zeros_like(x),
         active=answer.active,

@@ -145,7 +145,7 @@ class CondensedFriction:
         """
         free = self.condensed.find_free_motion(many.b)
         k = len(free)
-        m = len(many.bound)
+        m = many.bound.shape[-1]
         d = 1 + self._surface.tangents.shape[1]
         r = np.zeros((k, m, d))
         values = np.zeros(free.shape)

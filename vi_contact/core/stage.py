@@ -1,0 +1,226 @@
+"""Say where in a step the balance of forces holds: all that a time scheme has to say of it.
+
+A scheme has one unknown x for a step, the displacement or the velocity at its end. It predicts x by
+a ``guess`` and solves for the increment d = x - guess. Displacement, velocity and acceleration at
+the *stage* are affine in d,
+
+    u = u_g + alpha d,    v = v_g + beta d,    a = a_g + gamma d
+
+and the balance of forces holds there, with the means of the scheme:
+
+    M a + C v + K u = f - carried - B_nᵀ r_n - B_tᵀ r_t
+
+``carried`` are reactions of the beginning that stand in it. Times ``scale`` this is a step of the
+contract (``core.step``) for d:
+
+    A d = b - Bᵀ(scale r),    A = scale (gamma M + beta C + alpha K)
+    b = scale (f - carried - M a_g - C v_g - K u_g)
+
+b is what is left of the forces at the guess, which is small beside them: rounding of a solver is
+relative to d and not to x, so that free flight does not drift (``tests/schemes/test_drift.py``).
+
+``pose`` makes the step, ``complete`` takes its answer back to x and to newtons, and ``average``
+makes the equation of motion that the ledger reads. Vectors may also be rows (k, n) of several runs.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .algebra import Array, EffectiveMatrix, Mask
+from .problem import ContactProblem
+from .step import Balance, StepProblem, StepResult
+from .system import SemiDiscreteSystem
+
+
+@dataclass(frozen=True)
+class Affine:
+    """Hold a vector that is affine in the increment: at_guess + slope d.
+
+    Attributes:
+        at_guess: its value (n,) at d = 0; None for zero, whose products cost nothing.
+        slope: its derivative, a number.
+    """
+
+    at_guess: Array | None
+    slope: float
+
+    def __call__(self, d: Array) -> Array:
+        """Return its value (n,) at an increment d (n,)."""
+        change = self.slope * d
+        return change if self.at_guess is None else self.at_guess + change
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Hold the balance of a step by the equations of the module.
+
+    Attributes:
+        guess: x (n,) at d = 0, [m] or [m/s].
+        u: displacement at the stage [m].
+        v: velocity at the stage [m/s].
+        a: acceleration at the stage [m/s²].
+        load: f (n,) [N], the mean load of the scheme.
+        scale: what the balance is multiplied by; reactions of the posed step are so many newtons.
+        bound: (m,) largest B_n x, infinite where nothing is in the way.
+        slip0: B_t x (m, d - 1) where the slip is zero; None without friction.
+        active: predicted contact set (m,).
+        t: time [s] at the end of the step.
+        k: number of the step.
+        rate_factor: slip rate [m/s] over B_t x - slip0.
+        carried: Bᵀr (n,) [N] of reactions of the beginning; None for none.
+        weight: of this balance in the mean equation of the step.
+        before: makes the balance at the beginning of the step, which has the weight 1 -
+            ``weight``; None where this balance is the mean one but for its weight.
+    """
+
+    guess: Array
+    u: Affine
+    v: Affine
+    a: Affine
+    load: Array
+    scale: float
+    bound: Array
+    slip0: Array | None
+    active: Mask
+    t: float
+    k: int
+    rate_factor: float
+    carried: Array | None = None
+    weight: float = 1.0
+    before: Callable[[], Balance] | None = None
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Hold the certified answer of a step, as ``Scheme.finish`` takes it.
+
+    Attributes:
+        x: the unknown (n,) of the scheme, [m] or [m/s].
+        d: its increment (n,), x - guess.
+        r_n: normal reactions (m,) [N].
+        r_t: tangential reactions (m, d - 1) [N]; None without friction.
+        active: (m,) True for closed conditions.
+    """
+
+    x: Array
+    d: Array
+    r_n: Array
+    r_t: Array | None
+    active: Mask
+
+
+def make_matrix(system: SemiDiscreteSystem, stage: Stage) -> EffectiveMatrix:
+    """Return A of the steps with these slopes and this scale.
+
+    Args:
+        system: the equations that are marched.
+        stage: of any step of one size.
+    """
+    return system.effective(
+        m=stage.scale * stage.a.slope, c=stage.scale * stage.v.slope, k=stage.scale * stage.u.slope
+    )
+
+
+def pose(problem: ContactProblem, stage: Stage, A: EffectiveMatrix) -> StepProblem:
+    """Return the step for d, with the forces that are left at the guess as its load.
+
+    Args:
+        problem: the problem that is marched.
+        stage: the balance.
+        A: the effective matrix of the stage.
+    """
+    system = problem.equations
+    surface = problem.surface
+
+    # Forces at the guess. Accelerations are often zero there, by the choice of the guess.
+    force = stage.load.copy() if stage.carried is None else stage.load - stage.carried
+    if stage.a.at_guess is not None:
+        force -= system.M @ stage.a.at_guess
+    if system.C is not None and stage.v.at_guess is not None:
+        force -= system.C @ stage.v.at_guess
+    internal = None
+    if stage.u.at_guess is not None:
+        internal = system.K @ stage.u.at_guess
+        force -= internal
+    if stage.scale != 1.0:
+        force *= stage.scale
+
+    # Conditions on d are those on x, seen from the guess.
+    slip0 = stage.slip0
+    if slip0 is not None:
+        slip0 = slip0 - surface.tangential_values(stage.guess)
+    return StepProblem(
+        A=A,
+        b=force,
+        bound=stage.bound - surface.normal_values(stage.guess),
+        surface=surface,
+        scale=stage.scale,
+        guess=np.zeros_like(stage.guess),
+        active=stage.active,
+        t=stage.t,
+        k=stage.k,
+        friction=problem.friction,
+        slip0=slip0,
+        rate_factor=stage.rate_factor,
+        origin=stage.guess,
+        internal=internal,
+    )
+
+
+def complete(stage: Stage, step: StepProblem, result: StepResult) -> Answer:
+    """Return the answer for x, with reactions in newtons.
+
+    Rounding of guess + d must not open a closed point or move one that sticks: where d is on its
+    bound, x is exactly on its own, and where the slip is zero it stays so.
+
+    Args:
+        stage: the balance.
+        step: what ``pose`` made of it.
+        result: the answer of a solver, for d.
+    """
+    surface = step.surface
+    d = result.x
+    x = stage.guess + d
+    on_bound = surface.normal_values(d) == step.bound
+    if on_bound.any():
+        surface.put_normal(x, stage.bound, on_bound)
+    if stage.slip0 is not None:
+        sticks = surface.tangential_values(d) == step.slip0
+        if sticks.any():
+            surface.put_tangential(x, stage.slip0, sticks)
+    r_n = result.r_n
+    r_t = result.r_t
+    if stage.scale != 1.0:
+        r_n = r_n / stage.scale
+        r_t = None if r_t is None else r_t / stage.scale
+    return Answer(x, d, r_n, r_t, result.active)
+
+
+def average(problem: ContactProblem, stage: Stage, answer: Answer) -> Balance:
+    """Return the mean equation of motion of a step, for the energy ledger.
+
+    Args:
+        problem: the problem that is marched.
+        stage: the balance.
+        answer: of the step.
+    """
+    surface = problem.surface
+    r_n = answer.r_n
+    r_t = answer.r_t
+    if stage.carried is not None:
+        r_n = r_n + surface.normal_values(stage.carried)
+        if r_t is not None:
+            r_t = r_t + surface.tangential_values(stage.carried)
+    balance = Balance(
+        u=stage.u(answer.d),
+        v=stage.v(answer.d),
+        a=stage.a(answer.d),
+        f=stage.load,
+        r_n=r_n,
+        r_t=r_t,
+    )
+    if stage.weight == 1.0:
+        return balance
+    return balance.weigh(stage.weight, None if stage.before is None else stage.before())
