@@ -29,7 +29,7 @@ def products(system):
     found = []
     for k in (1.0, 2.0, 3.0):
         v = np.sin(k * x + 0.3 * k**2 * y)
-        found.append(system.algebra.dot(v, system.product("C", v)))
+        found.append(system.algebra.dot(v, system.C @ v))
     return np.array(found)
 
 

@@ -21,6 +21,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 from pictures import is_drawn
+from posed import matrix_of
 
 import vi_contact as vc
 from vi_contact import solvers
@@ -116,7 +117,7 @@ def solved_step(figures: ModuleType) -> list[str]:
         figures.two_masses(), scheme=vc.Midpoint(), solver=vc.Condensed(), dt=0.05, steps=1
     )
     A, b, (x, y), r = (
-        np.column_stack([report.step.A.image(e) for e in np.eye(2)]),
+        np.column_stack([report.step.A @ e for e in np.eye(2)]),
         report.step.b,
         report.result.x,
         report.result.r_n,
@@ -218,7 +219,7 @@ def solved_certificate(figures: ModuleType) -> list[str]:
     problem = figures.bar(case, n)
     dt = 0.5 * case.length / n / case.wave_speed
     ((_, report),) = vc.march(problem, solver=vc.Condensed(), dt=dt, steps=1)
-    A = np.column_stack([report.step.A.image(e) for e in np.eye(n + 1)])
+    A = np.column_stack([report.step.A @ e for e in np.eye(n + 1)])
     largest = np.abs(case.displacement(np.linspace(0.0, case.length, n + 1), 1.0)).max()
     k_p, foot, before = float(case.force(1.0)) / (1e-9 * largest), A[0, 0], np.linalg.cond(A)
     A[0, 0] += k_p
@@ -260,7 +261,7 @@ def solved_condensation(figures: ModuleType) -> list[str]:
     for K in ([[2.0 * k, -k], [-k, k]], [[k, -k], [-k, k]]):
         system = vc.system_from_arrays([1.0, 1.0], None, K, coordinates=[[0.0], [1.0]])
         problem = vc.ContactProblem(system, vc.contact_points(system, [1], [1.0], gap0=1.0))
-        A = vc.Midpoint().effective_matrix(problem, 0.05)
+        A = matrix_of(vc.Midpoint(), problem, 0.05)
         found.append(float(vc.Condensed().prepare(A, problem.surface, 2.0).delassus.item()))
     chain, pair = found
     assert chain == pytest.approx((mu + 2.0 * k) / ((mu + 2.0 * k) * (mu + k) - k**2), rel=1e-12)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from bar import run, thrown
 from chain import chain_problem
+from posed import matrix_of
 from rubbing import rubbing_block
 from shaken import SHAKE, shaken
 
@@ -142,7 +143,7 @@ def test_attempts_that_were_thrown_away_do_not_count():
     problem, base, plan = shaken(), 5e-3, HalvedAtImpact(5e-3, halvings=3)
     accepted = list(run(problem, HALF, dt=plan, steps=200))
     assert len(accepted) > 200 + 3 * 3
-    attempts = WrongWhenClosing(1.0, 2.0, HALF.effective_matrix(problem, base / 8))
+    attempts = WrongWhenClosing(1.0, 2.0, matrix_of(HALF, problem, base / 8))
     checked = cross_check(problem, scheme=HALF, solvers=[Condensed(), attempts], dt=plan, steps=200)
     assert checked.worst <= 1e-9 and checked.found[0].steps == len(accepted)
     whole = cross_check(problem, scheme=HALF, solvers=[Condensed(), attempts], dt=base, steps=200)

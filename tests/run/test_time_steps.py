@@ -4,7 +4,7 @@ test_time_steps_in_folders)."""
 from __future__ import annotations
 
 import weakref
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from itertools import pairwise
 from math import inf
 from typing import Any
@@ -19,9 +19,11 @@ from shaken import changes, shaken
 
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.problem import ContactProblem
+from vi_contact.core.stage import make_matrix
 from vi_contact.core.step import Report
 from vi_contact.laws.impact import ImpulseUpdate, Inelastic
 from vi_contact.laws.mass import ConsistentMass, Redistributed
+from vi_contact.run import march
 from vi_contact.run.recorders import Energy
 from vi_contact.run.time_steps import HalvedAtImpact, Schedule, StepPlan, plan_steps
 from vi_contact.schemes.linear_multistep import LinearMultistep
@@ -294,15 +296,17 @@ def test_order_with_a_change_in_mid_run(scheme, order):
 # one matrix for every dt
 
 
-@dataclass(frozen=True)
-class Counted(ZienkiewiczWoodTaylor):
-    """Remembers the dt of every effective matrix it made, and the matrices as long as somebody else
-    keeps them."""
+class Counted:
+    """Remembers the dt of every effective matrix of a march, and the matrices as long as somebody
+    else keeps them."""
 
-    made: list[tuple[float, Any]] = field(default_factory=list)
+    def __init__(self, monkeypatch):
+        self.made: list[tuple[float, Any]] = []
+        monkeypatch.setattr(march, "make_matrix", self._make)
 
-    def effective_matrix(self, problem, dt):
-        A = super().effective_matrix(problem, dt)
+    def _make(self, system, stage):
+        A = make_matrix(system, stage)
+        dt = float(f"{1.0 / stage.rate_factor:.12g}")
         self.made.append((dt, weakref.ref(A)))
         return A
 
@@ -316,30 +320,30 @@ class Counted(ZienkiewiczWoodTaylor):
 
 
 @serial
-def test_one_matrix_for_every_dt_of_a_halved_run():
+def test_one_matrix_for_every_dt_of_a_halved_run(monkeypatch):
     """Flipping between few dts factorises each of them once; what is never needed is never made."""
-    scheme, problem = Counted(), shaken(Inelastic())
-    reports = list(run(problem, scheme, dt=HalvedAtImpact(5e-3, 3), steps=300))
+    counted, problem = Counted(monkeypatch), shaken(Inelastic())
+    reports = list(run(problem, HALF, dt=HalvedAtImpact(5e-3, 3), steps=300))
     assert changes(reports) >= 8
-    assert scheme.sizes == [5e-3, 2.5e-3, 1.25e-3, 0.625e-3]
-    calm = Counted()
-    list(run(replace(problem, excitation=()), calm, dt=HalvedAtImpact(5e-3, 3), steps=20))
+    assert counted.sizes == [5e-3, 2.5e-3, 1.25e-3, 0.625e-3]
+    calm = Counted(monkeypatch)
+    list(run(replace(problem, excitation=()), HALF, dt=HalvedAtImpact(5e-3, 3), steps=20))
     assert calm.sizes == [5e-3]
 
 
 @serial
-def test_factors_of_pieces_that_are_over_are_freed():
+def test_factors_of_pieces_that_are_over_are_freed(monkeypatch):
     """A plan of ten pieces keeps one matrix (and that of the last report), with halves those of the
     piece."""
     sizes = [1e-3 * (1.0 + 0.1 * i) for i in range(10)]
     times = np.cumsum([5.0 * dt for dt in sizes])
     plan = Schedule(tuple(zip(sizes, times, strict=True)))
-    scheme = Counted()
-    for i, _ in enumerate(run(shaken(), scheme, dt=plan, steps=50)):
-        assert scheme.alive == {sizes[i // 5]} and scheme.sizes == sizes[: i // 5 + 1]
-    halved, dyadic = Counted(), Schedule(((4e-3, 0.4), (2e-3, inf)))
+    counted = Counted(monkeypatch)
+    for i, _ in enumerate(run(shaken(), HALF, dt=plan, steps=50)):
+        assert counted.alive == {sizes[i // 5]} and counted.sizes == sizes[: i // 5 + 1]
+    halved, dyadic = Counted(monkeypatch), Schedule(((4e-3, 0.4), (2e-3, inf)))
     alive = [
-        set(halved.alive) for _ in run(shaken(), halved, dt=HalvedAtImpact(dyadic, 2), steps=200)
+        set(halved.alive) for _ in run(shaken(), HALF, dt=HalvedAtImpact(dyadic, 2), steps=200)
     ]
     assert alive[-1] == {2e-3, 1e-3, 0.5e-3} and {4e-3, 2e-3, 1e-3} in alive
     assert halved.sizes == [4e-3, 2e-3, 1e-3, 0.5e-3]  # shared by both pieces

@@ -144,9 +144,9 @@ def test_V95_identity():
     surface, M = problem.surface, problem.equations.M
     for report in run(problem, STABILISED, dt=dt, steps=450):
         old, new = report.old, report.new
-        pushed = -(M @ (report.step.guess - old.u - dt * old.v))
+        pushed = -(M @ (report.step.origin - old.u - dt * old.v))
         q = surface.normal_values(pushed)
-        between = surface.gap0 - surface.normal_values(report.step.guess)
+        between = surface.gap0 - surface.normal_values(report.step.origin)
         unit = np.abs(M @ old.u).max() + 1.0
         assert np.abs(pushed[1:]).max() <= 1e-13 * unit and q[0] >= -1e-13 * unit
         assert between[0] >= -1e-13 * 5.0 and abs(q[0] * between[0]) <= 1e-13 * unit

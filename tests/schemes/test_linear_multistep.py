@@ -11,6 +11,7 @@ import pytest
 from bar import bar, bouncing, energy, run, thrown
 from chain import chain_problem
 from oscillator import SHAKEN, dense, last_state, observed_order, oscillators
+from posed import matrix_of
 
 from vi_contact.core.errors import InputError
 from vi_contact.laws.impact import Inelastic
@@ -42,7 +43,7 @@ def test_V41_effective_matrix():
         (NEWMARK, 4.0 * rho / dt**2 + 2.0 * 3.0 / dt + 7.0),
         (HOUBOLT, 2.0 * rho / dt**2 + 11.0 / 6.0 * 3.0 / dt + 7.0),
     ):
-        assert scheme.effective_matrix(problem, dt).matrix.diagonal()[0] == pytest.approx(
+        assert matrix_of(scheme, problem, dt).matrix.diagonal()[0] == pytest.approx(
             expected, rel=1e-14
         )
 

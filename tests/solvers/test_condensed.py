@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from bar import bar, run, thrown
 from chain import chain_problem
+from posed import matrix_of
 from shaken import SHAKE, shaken
 
 from vi_contact.core.algebra import SerialComm
@@ -58,7 +59,7 @@ def problem(m: int = 5, **more: Any) -> ContactProblem:
 
 def dense(p: ContactProblem, dt: float) -> np.ndarray:
     """The effective matrix in contact order: conditions first (by slot), then the rest."""
-    A = HALF.effective_matrix(p, dt)
+    A = matrix_of(HALF, p, dt)
     return np.column_stack([A @ e for e in np.eye(p.equations.rows)])
 
 
@@ -75,7 +76,7 @@ def test_V40_schur_matrix_from_its_definition():
     c = p.surface.owned
     i = np.setdiff1d(np.arange(10), c)
     D = K[np.ix_(c, c)] - K[np.ix_(c, i)] @ np.linalg.solve(K[np.ix_(i, i)], K[np.ix_(i, c)])
-    prepared = Condensed().prepare(HALF.effective_matrix(p, DT), p.surface, 2.0)
+    prepared = Condensed().prepare(matrix_of(HALF, p, DT), p.surface, 2.0)
     schur = np.linalg.inv(prepared.delassus)
     assert np.abs(schur - D).max() <= 1e-10 * np.abs(D).max()
     assert np.abs(schur - schur.T).max() <= 1e-12 * np.abs(D).max()
@@ -168,9 +169,9 @@ def test_springs_add_their_compliance():
     for scheme, scale in ((HALF, 2.0), (LinearMultistep.newmark(), 1.0)):
         p = bar(1, clamped=True, gap=0.0)
         p = replace(p, surface=replace(p.surface, compliance=np.array([0.125])))
-        prepared = Condensed().prepare(scheme.effective_matrix(p, DT), p.surface, scale)
+        prepared = Condensed().prepare(matrix_of(scheme, p, DT), p.surface, scale)
         rigid = Condensed().prepare(
-            scheme.effective_matrix(p, DT), replace(p.surface, compliance=np.zeros(1)), scale
+            matrix_of(scheme, p, DT), replace(p.surface, compliance=np.zeros(1)), scale
         )
         assert prepared.delassus - rigid.delassus == pytest.approx(0.125 / scale)
 
@@ -205,4 +206,4 @@ def test_friction_that_cannot_act_is_refused_not_ignored():
 def test_a_contact_that_cannot_move_is_named():
     p = replace(problem(), surface=rows(10, [8, 9, 9]))
     with pytest.raises(InputError, match="twice"):
-        Condensed().prepare(HALF.effective_matrix(p, DT), p.surface, 2.0)
+        Condensed().prepare(matrix_of(HALF, p, DT), p.surface, 2.0)

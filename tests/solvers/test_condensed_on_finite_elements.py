@@ -14,6 +14,7 @@ pytest.importorskip("dolfinx")
 from contact_cases import PROBLEMS, WEAKENING, pressed
 from fem_problems import BOX_DT, max_over_ranks, thrown_box
 from mpi4py import MPI
+from posed import matrix_of
 
 import vi_contact as vc
 from vi_contact.core.algebra import EffectiveMatrix
@@ -127,7 +128,7 @@ def test_what_else_factorises(monkeypatch: Any) -> None:
     """What CHOLMOD cannot do, what users order otherwise, and machines without it: PETSc
     factorises."""
     problem = thrown_box(COMM)
-    A = vc.ZienkiewiczWoodTaylor().effective_matrix(problem, BOX_DT)
+    A = matrix_of(vc.ZienkiewiczWoodTaylor(), problem, BOX_DT)
     last = np.arange(3)
     assert A.algebra.contact_last(A.matrix, last) is not None
     indefinite = A.algebra.combine([(-1.0, A.matrix)])

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from fem_problems import max_over_ranks, shaken_wall
 from mpi4py import MPI
+from posed import first_step
 
 from vi_contact.core.algebra import EffectiveMatrix
 from vi_contact.core.errors import StepFailure
@@ -46,8 +47,7 @@ def pressed(problem: ContactProblem, scheme: Scheme, dt: float) -> StepProblem:
     v = problem.surface.in_frames(
         np.sin(3.0 * points[:, 1]) + 0.3 * np.cos(5.0 * points.sum(axis=1))
     )
-    A = scheme.effective_matrix(problem, dt)
-    step = scheme.step(problem, replace(initial_state(problem), v=v), A, dt)
+    step = first_step(scheme, problem, dt, replace(initial_state(problem), v=v))
     return replace(step, active=np.zeros(problem.surface.count, dtype=bool))
 
 

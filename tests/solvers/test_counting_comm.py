@@ -16,6 +16,7 @@ pytest.importorskip("dolfinx")
 
 from fem_problems import BOX_DT, thrown_box
 from mpi4py import MPI
+from posed import first_step
 from standing import standing
 
 import vi_contact as vc
@@ -130,8 +131,8 @@ def test_a_step_and_its_certificate(kind: str, traffic: Traffic) -> None:
     assert problem.surface.total > 2 * DOZEN
     state = initial_state(problem)
     traffic.begin()
-    A = scheme.effective_matrix(problem, BOX_DT)
-    step = scheme.step(problem, state, A, BOX_DT)
+    step = first_step(scheme, problem, BOX_DT, state)
+    A = step.A
     step, made = replace(step, active=~step.active), traffic.products
     result = vc.Iterative(kind).prepare(A, problem.surface, step.scale).solve(step)
     assert traffic.small and traffic.products == made

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from column import column
+from posed import first_step, matrix_of
 from small_steps import small
 
 from vi_contact.core.algebra import SerialComm
@@ -68,7 +69,7 @@ def test_delassus_operator_from_its_definition() -> None:
     """DᵀA⁻¹D node by node, compliance/scale on the diagonal of normal rows; a prescribed tangent
     stands alone."""
     p = rough()
-    A = SCHEME.effective_matrix(p, DT)
+    A = matrix_of(SCHEME, p, DT)
     inverse = np.linalg.inv(np.column_stack([A @ e for e in np.eye(p.equations.rows)]))
     order = [5, 4, 1, 0, 9, -1]  # slots 0, 1, 2
     expected = np.zeros((6, 6))
@@ -83,11 +84,11 @@ def test_delassus_operator_from_its_definition() -> None:
 def test_nothing_is_made_without_friction() -> None:
     """Tangential columns cost back-substitutions: none before the first step that rubs."""
     p = problem(Frictionless())
-    A = SCHEME.effective_matrix(p, DT)
+    A = matrix_of(SCHEME, p, DT)
     solver = CertifiedSolver(p, A, 2.0, [Condensed()], 1e-9)
     prepared: Any = solver._get(0)
     state = next(report.old for report in reports(p) if report.new.active.any())
-    result, _, _ = solver.solve(SCHEME.step(p, state, A, DT))
+    result = solver.solve(first_step(SCHEME, p, DT, state)).result
     assert result.r_t is None and "friction" not in vars(prepared)
     rubbing = replace(p, friction=Coulomb(0.4))
     result, certificate, _ = solver.solve(SCHEME.step(rubbing, state, A, DT))

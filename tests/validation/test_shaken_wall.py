@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from fem_problems import dense, spread
 from mpi4py import MPI
+from posed import matrix_of
 from wall_runs import POINTS, SCHEME, follow, history, model, problem
 
 from demos.parts.problems.wall import Wall
@@ -36,7 +37,7 @@ one_rank = pytest.mark.serial
 
 def prepared(case: str) -> tuple[ContactProblem, EffectiveMatrix, PreparedCondensed]:
     given = problem(case)
-    A = SCHEME.effective_matrix(given, model().time_step())
+    A = matrix_of(SCHEME, given, model().time_step())
     return given, A, Condensed().prepare(A, given.surface, 2.0)
 
 

@@ -270,6 +270,12 @@ class EffectiveMatrix:
         return self.matrix @ x
 
 
+def freeze(x: Array) -> Array:
+    """Return the array, which nobody can write to from now on."""
+    x.flags.writeable = False
+    return x
+
+
 class SerialComm:
     """Serve one process: every collective operation is the identity."""
 

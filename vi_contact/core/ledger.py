@@ -70,16 +70,25 @@ class Energies:
         return self.kinetic + self.strain
 
 
-def compute_energies(system: SemiDiscreteSystem, u: Array, v: Array) -> Energies:
+def compute_energies(
+    system: SemiDiscreteSystem,
+    u: Array,
+    v: Array,
+    *,
+    momentum: Array | None = None,
+    elastic: Array | None = None,
+) -> Energies:
     """Return the energies of a state: two products, unless they are known. Collective.
 
     Args:
         system: the equations that are marched.
         u: displacement (n,) [m].
         v: velocity (n,) [m/s].
+        momentum: M v (n,) [N s], when it is known.
+        elastic: K u (n,) [N], when it is known.
     """
-    momentum = system.product("M", v)
-    elastic = system.product("K", u)
+    momentum = system.M @ v if momentum is None else momentum
+    elastic = system.K @ u if elastic is None else elastic
     kinetic, strain = _dot_pairs(system, (v, momentum), (u, elastic))
     return Energies(momentum, elastic, 0.5 * kinetic, 0.5 * strain)
 
@@ -118,7 +127,7 @@ def energy_balance(
         damping = du·C v
         contact = r_n·B_n du    (work lost to the support, stored or dissipated there)
         friction = r_t·B_t du
-        algorithmic = du·M a - ½(v0 + v1)·M (v1 - v0) + du·K u - ½(u0 + u1)·K du
+        algorithmic = du·(M a + K u) - ½(v0 + v1)·M (v1 - v0) - ½(K u0 + K u1)·du
 
     algorithmic is 0 for the midpoint rule, and change is the difference of the energies themselves,
     so the defect measures the equation of motion. Collective.
@@ -129,7 +138,7 @@ def energy_balance(
         new: the state after it, before the impact law.
         balance: the equation of motion that the step satisfied.
         before: the energies of ``old``, when they are known.
-        after: those of ``new``. With both, one product is left, two with damping.
+        after: those of ``new``. With both, no product is left, one with damping.
     """
     system = problem.equations
     surface = problem.surface
@@ -145,21 +154,21 @@ def energy_balance(
         rubbing = float(np.sum(balance.r_t * surface.tangential_values(du)))
     damping = 0.0
     if system.C is not None:
-        damping = float(du.dot(system.product("C", balance.v)))
+        damping = float(du.dot(system.C @ balance.v))
 
     # One reduction adds them up over the ranks, and five inner products with them: the work of
-    # loads, that of M a, the change of kinetic energy, the work of K (u - ½(u0 + u1)) on du (K is
-    # symmetric: K du is known), and the work of normal reactions.
+    # loads, that of M a + C v + K u, the changes of kinetic and of strain energy (as M and K are
+    # symmetric, a mean times a difference), and the work of normal reactions.
     works = _dot_pairs(
         system,
         (du, balance.f),
-        (du, system.product("M", balance.a)),
+        (du, balance.forces),
         (0.5 * (old.v + new.v), after.momentum - before.momentum),
-        (balance.u - 0.5 * (old.u + new.u), after.elastic - before.elastic),
+        (0.5 * (before.elastic + after.elastic), du),
         (balance.r_n, surface.normal_values(du)),
         sums=(rubbing, pushing, dragging, damping),
     )
-    loading, inertia, kinetic, stiffness, pressing, rubbing, pushing, dragging, damping = works
+    loading, inner, kinetic, strain, pressing, rubbing, pushing, dragging, damping = works
 
     # The support takes what reactions do on the motion relative to it. What they do on its own
     # motion is input.
@@ -169,7 +178,7 @@ def energy_balance(
         damping=damping,
         contact=pressing + pushing,
         friction=rubbing + dragging,
-        algorithmic=inertia - kinetic + stiffness,
+        algorithmic=inner - damping - kinetic - strain,
     )
 
 

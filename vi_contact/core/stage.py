@@ -102,6 +102,7 @@ class Answer:
         r_n: normal reactions (m,) [N].
         r_t: tangential reactions (m, d - 1) [N]; None without friction.
         active: (m,) True for closed conditions.
+        image: A d (n,), ``scale`` times newtons.
     """
 
     x: Array
@@ -109,6 +110,7 @@ class Answer:
     r_n: Array
     r_t: Array | None
     active: Mask
+    image: Array
 
 
 def make_matrix(system: SemiDiscreteSystem, stage: Stage) -> EffectiveMatrix:
@@ -169,7 +171,7 @@ def pose(problem: ContactProblem, stage: Stage, A: EffectiveMatrix) -> StepProbl
     )
 
 
-def complete(stage: Stage, step: StepProblem, result: StepResult) -> Answer:
+def complete(stage: Stage, step: StepProblem, result: StepResult, image: Array) -> Answer:
     """Return the answer for x, with reactions in newtons.
 
     Rounding of guess + d must not open a closed point or move one that sticks: where d is on its
@@ -179,6 +181,7 @@ def complete(stage: Stage, step: StepProblem, result: StepResult) -> Answer:
         stage: the balance.
         step: what ``pose`` made of it.
         result: the answer of a solver, for d.
+        image: A d (n,).
     """
     surface = step.surface
     d = result.x
@@ -195,15 +198,16 @@ def complete(stage: Stage, step: StepProblem, result: StepResult) -> Answer:
     if stage.scale != 1.0:
         r_n = r_n / stage.scale
         r_t = None if r_t is None else r_t / stage.scale
-    return Answer(x, d, r_n, r_t, result.active)
+    return Answer(x, d, r_n, r_t, result.active, image)
 
 
-def average(problem: ContactProblem, stage: Stage, answer: Answer) -> Balance:
+def average(problem: ContactProblem, stage: Stage, step: StepProblem, answer: Answer) -> Balance:
     """Return the mean equation of motion of a step, for the energy ledger.
 
     Args:
         problem: the problem that is marched.
         stage: the balance.
+        step: what ``pose`` made of it.
         answer: of the step.
     """
     surface = problem.surface
@@ -213,12 +217,18 @@ def average(problem: ContactProblem, stage: Stage, answer: Answer) -> Balance:
         r_n = r_n + surface.normal_values(stage.carried)
         if r_t is not None:
             r_t = r_t + surface.tangential_values(stage.carried)
+
+    # M a + C v + K u: those at the guess, which are the loads less what was left for the step, and
+    # those that the increment adds, which the certificate has made.
+    loads = stage.load if stage.carried is None else stage.load - stage.carried
+    forces = loads + (answer.image - step.b) / stage.scale
     balance = Balance(
         u=stage.u(answer.d),
         v=stage.v(answer.d),
         a=stage.a(answer.d),
         f=stage.load,
         r_n=r_n,
+        forces=forces,
         r_t=r_t,
     )
     if stage.weight == 1.0:

@@ -282,6 +282,7 @@ class Balance:
         a: averaged acceleration (n,) [m/s²].
         f: averaged load (n,) [N].
         r_n: averaged normal reactions (m,) [N].
+        forces: M a + C v + K u (n,) [N], of the arrays that the solver and the certificate used.
         r_t: averaged tangential reactions (m, d - 1) [N]; None without friction.
     """
 
@@ -290,6 +291,7 @@ class Balance:
     a: Array
     f: Array
     r_n: Array
+    forces: Array
     r_t: Array | None = None
 
     def weigh(self, weight: float, other: "Balance | None" = None) -> "Balance":
@@ -455,6 +457,16 @@ class Report:
     def balance(self) -> Balance:
         """Return the equation of motion of the step; it is made when somebody asks."""
         return self.averages()
+
+    @cached_property
+    def momentum(self) -> Array:
+        """Return M v (n,) [N s] of the velocity before the impact law, made once."""
+        return self.problem.equations.M @ self.v_minus
+
+    @cached_property
+    def elastic(self) -> Array:
+        """Return K u (n,) [N] at the end of the step, made once."""
+        return self.problem.equations.K @ self.new.u
 
 
 def find_slipping(report: Report) -> Mask:

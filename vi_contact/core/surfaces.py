@@ -21,13 +21,23 @@ from typing import Annotated, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .algebra import Array, Comm, Indices, Mask, Matrix, SerialComm, largest, on_first, total
+from .algebra import (
+    Array,
+    Comm,
+    Indices,
+    Mask,
+    Matrix,
+    SerialComm,
+    freeze,
+    largest,
+    on_first,
+    total,
+)
 from .arguments import check_arguments
 from .census import Census
 from .checks import function, quote
 from .collective import call_user
 from .errors import InputError
-from .products import freeze
 from .quantities import Positive, Unit
 from .system import Companion
 

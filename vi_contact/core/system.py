@@ -6,9 +6,8 @@ the mass law change M, takes contact points relative to a deformable other side 
 and adds the inertia loads of excitations; schemes read what comes out as ``problem.equations``.
 Each of these makes another system, as none ever changes.
 
-Three things are remembered in a system, as they are asked for again and again: products with M, C
-and K (``product``), the load at the last times (``load_at``), and whatever is made of the matrices
-once (``make_once``), such as factors.
+Two things are remembered in a system, as they are asked for again and again: the load at the last
+times (``load_at``), and whatever is made of the matrices once (``make_once``), such as factors.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,11 +16,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .algebra import Algebra, Array, EffectiveMatrix, Mask, Matrix
+from .algebra import Algebra, Array, EffectiveMatrix, Mask, Matrix, freeze
 from .checks import array, function, instance, provides, quote, several
 from .collective import keep_error
 from .errors import InputError
-from .products import Remembered
 
 
 class Companion(Protocol):
@@ -91,8 +89,7 @@ class Space(Protocol):
 
 
 OTHERS = 4  # surfaces and other objects, at most, for each of which factors are remembered
-# Products with each that are remembered: what a step and the next one may ask for again.
-PRODUCTS = {"M": 6, "C": 4, "K": 2, "load": 2}
+LOADS = 2  # times whose loads are remembered
 PAIR_REMEDY = "give pairs of a vector [N] and a function of the time"
 
 
@@ -258,9 +255,7 @@ class SemiDiscreteSystem:
     companions: tuple[Companion, ...] = ()
     statics_only: bool = False
     _cache: dict[str, Any] = field(init=False, default_factory=dict, compare=False, repr=False)
-    _products: dict[str, Remembered] = field(
-        init=False, default_factory=dict, compare=False, repr=False
-    )
+    _loads: dict[float, Array] = field(init=False, default_factory=dict, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         owner = "SemiDiscreteSystem"
@@ -336,56 +331,29 @@ class SemiDiscreteSystem:
 
     def forget_loads(self) -> None:
         """Forget the loads of the last times: a user's functions may give others in another run."""
-        self._products.pop("load", None)
-
-    def product(self, name: str, x: Array) -> Array:
-        """Return M x, C x or K x (n,), or rows (k, n) of rows; read-only.
-
-        The last products with read-only vectors are remembered (``core.products``).
-
-        Args:
-            name: "M", "C" or "K".
-            x: displacement, velocity or acceleration (n,), or rows (k, n).
-        """
-        return (self._products.get(name) or self._open_memory(name))(x)
-
-    def _open_memory(self, name: str) -> Remembered:
-        """Return the memory of the products with a matrix, or of the load."""
-        function = self.load if name == "load" else getattr(self, name).__matmul__
-        return self._products.setdefault(name, Remembered(function, PRODUCTS[name]))
-
-    def know_rows(self, many: "SemiDiscreteSystem", row: int, *known: tuple[str, Any, Any]) -> None:
-        """Learn products of one run from those of several runs.
-
-        When it is asked for, the product with x is a row of the product with the rows.
-
-        Args:
-            many: the system that the runs share.
-            row: the row of this run.
-            known: (name, x, rows) for each product that is known: the vector x (n,) of this run
-                stands in the row of ``rows`` (k, n), whose product the shared system knows. For the
-                load ("load", t, t).
-        """
-
-        def take_row(name: str, rows: Any) -> Callable[[], Array]:
-            return lambda: np.asarray(many.product(name, rows)[row])
-
-        for name, x, rows in known:
-            self._open_memory(name).know(x, take_row(name, rows))
+        self._loads.clear()
 
     @property
     def times(self) -> list[float]:
         """Return the times [s] at which the load is remembered."""
-        return self._products["load"].numbers() if "load" in self._products else []
+        return list(self._loads)
 
     def load_at(self, t: float) -> Array:
         """Return f(t) (n,) [N], read-only.
 
-        Those of the last two times are remembered, unless something is marched beside the system.
+        Those of the last two times are remembered, as the end of a step is the beginning of the
+        next one, unless something is marched beside the system.
         """
         if self.companions:
             return self.load(t)
-        return (self._products.get("load") or self._open_memory("load"))(float(t))
+        known = self._loads.get(t)
+        if known is not None:
+            return known
+        while len(self._loads) >= LOADS:
+            oldest = next(iter(self._loads))
+            del self._loads[oldest]
+        self._loads[t] = freeze(self.load(t))
+        return self._loads[t]
 
     def changed(self, **values: Any) -> "SemiDiscreteSystem":
         """Return the same system with other values of some attributes, and with no factor yet.

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .algebra import Comm
+from .algebra import Array, Comm
 from .certificate import Certificate
 from .collective import ask_limit
 from .step import StepProblem, StepResult
@@ -24,7 +24,7 @@ ROUNDING = 1e-5
 FEW = 5_000  # numbers in an array, up to which copies cost less than calls
 
 
-def kkt_residual(step: StepProblem, result: StepResult) -> Certificate:
+def kkt_residual(step: StepProblem, result: StepResult, image: Array | None = None) -> Certificate:
     """Return how well an answer satisfies the conditions of its step. Collective.
 
     Args:
@@ -32,17 +32,21 @@ def kkt_residual(step: StepProblem, result: StepResult) -> Certificate:
             friction.
         result: the answer: x (n,), r_n (m,) [N, or N s where x is a velocity], r_t (m, d - 1) or
             None, active (m,).
+        image: A x (n,), when whoever asks has made it of this x; None: it is made here.
 
     Returns:
         The certificate, whose residuals are pure numbers. What is no number makes a residual
         infinite or NaN, so that it can never pass.
     """
-    (sizes,) = _measure_sizes(step, result)
+    (sizes,) = _measure_sizes(step, result, image)
     return _make_certificate(step, result, sizes)
 
 
 def kkt_residuals(
-    many: StepProblem, result: StepResult, own: Callable[[int], tuple[StepProblem, StepResult]]
+    many: StepProblem,
+    result: StepResult,
+    own: Callable[[int], tuple[StepProblem, StepResult]],
+    image: Array | None = None,
 ) -> list[Certificate]:
     """Return the certificates of several steps of one matrix, on one rank.
 
@@ -50,12 +54,13 @@ def kkt_residuals(
         many: the problems; b, guess (k, n) and active (k, m) have a row for each.
         result: the answers, a row for each.
         own: makes the problem and the answer of one row, whose friction is its own.
+        image: A x (k, n), when it has been made; None: it is made here.
 
     Returns:
         The certificate of each row, equal to that of ``kkt_residual``.
     """
     certificates = []
-    for row, sizes in enumerate(_measure_sizes(many, result)):
+    for row, sizes in enumerate(_measure_sizes(many, result, image)):
         # Without friction the sizes say all; a law of friction is asked for each run by itself.
         step, answer = (many, result) if many.slip0 is None else own(row)
         certificates.append(_make_certificate(step, answer, sizes))
@@ -81,7 +86,7 @@ class _Sizes(NamedTuple):
     r_n: Any
 
 
-def _measure_sizes(step: StepProblem, result: StepResult) -> list[_Sizes]:
+def _measure_sizes(step: StepProblem, result: StepResult, image: Array | None) -> list[_Sizes]:
     """Return the largest sizes of a step over all ranks; of several steps, an entry for each.
 
     The conditions are put in as they stand at the head of ``core.step``. Collective: one reduction.
@@ -89,7 +94,7 @@ def _measure_sizes(step: StepProblem, result: StepResult) -> list[_Sizes]:
     surface = step.surface
 
     # Equilibrium: what is left of A x - b when the contact forces are added to it.
-    image = step.A @ result.x
+    image = step.A @ result.x if image is None else image
     reactions = surface.reaction_load(result.r_n, result.x.shape[-1], result.r_t)
     unbalanced = image - step.b + reactions
 

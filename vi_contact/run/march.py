@@ -15,10 +15,9 @@ from functools import partial
 
 import numpy as np
 
-from ..core.algebra import EffectiveMatrix
+from ..core.algebra import EffectiveMatrix, freeze
 from ..core.collective import call_user, together, together_if_own
 from ..core.problem import ContactProblem
-from ..core.products import freeze
 from ..core.protocols import Impact
 from ..core.stage import average, complete, make_matrix, pose
 from ..core.state_checks import initial_state
@@ -192,18 +191,19 @@ class March:
         # where a point closes that was open before.
         if problem.surface.watched:
             problem.surface.refuse_driven(step.t)
-        result, certificate, escalated = solver.solve(step)
+        certified = solver.solve(step)
+        result = certified.result
         if not final and problem.surface.some(result.active & ~state.active):
             return None
 
         # Displacements and velocities at its end: of the scheme, then of the impact law.
-        answer = complete(stage, step, result)
+        answer = complete(stage, step, result, certified.image)
         with together_if_own(problem.surface.comm, scheme):
             free = scheme.finish(problem, state, stage, answer, dt)
         with together_if_own(problem.surface.comm, problem.impact or scheme):
             new = after_impact(problem, scheme, state, free, dt)
         for vector in (free.u, free.v, new.u, new.v):
-            freeze(vector)  # products with them are remembered, and have to stay true
+            freeze(vector)  # states are handed out, and the next step is made of them
 
         return Report(
             problem=problem,
@@ -212,10 +212,10 @@ class March:
             v_minus=free.v,
             step=step,
             result=result,
-            certificate=certificate,
+            certificate=certified.certificate,
             # formed only if some recorder asks for it
-            averages=partial(average, problem, stage, answer),
-            escalated=escalated,
+            averages=partial(average, problem, stage, step, answer),
+            escalated=certified.escalated,
         )
 
 

@@ -9,13 +9,13 @@ them.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from ..core.algebra import Array
+from ..core.algebra import Array, freeze
 from ..core.problem import ContactProblem
-from ..core.products import freeze
 from ..core.step import Balance, Report, State, StepProblem
 from ..core.system import Load, evaluate_history
 
@@ -50,6 +50,16 @@ class RowReport(Report):
         self.__dict__[name] = value
         return value
 
+    @cached_property
+    def momentum(self) -> Array:
+        """Return M v of the velocity before the impact law, a row of that of all runs."""
+        return np.asarray(self.parts["momentum"][self.row])
+
+    @cached_property
+    def elastic(self) -> Array:
+        """Return K u at the end, a row of that of all runs."""
+        return np.asarray(self.parts["elastic"][self.row])
+
 
 def join_states(states: Sequence[State]) -> State:
     """Return the states of all runs as rows of one, read-only.
@@ -82,27 +92,13 @@ def join_states(states: Sequence[State]) -> State:
     )
 
 
-def split_states(
-    problem: ContactProblem, problems: Sequence[ContactProblem], many: State
-) -> LazyRows:
-    """Return the states of the runs, each made when somebody asks for it.
-
-    Their problems get to know the products of the rows with M, K and C.
-
-    Args:
-        problem: of all runs, whose states are rows.
-        problems: of each run.
-        many: the states as rows.
-    """
+def split_states(many: State) -> LazyRows:
+    """Return the states of the runs, given as rows, each made when somebody asks for it."""
 
     def split_state(row: int) -> State:
-        """Return the state of one run, whose products are rows of those of all."""
+        """Return the state of one run."""
         u = many.u[row]
         v = many.v[row]
-        products = [("M", v, many.v), ("K", u, many.u)]
-        if problem.equations.C is not None:
-            products.append(("C", u, many.u))
-        problems[row].equations.know_rows(problem.equations, row, *products)
         memory = {
             name: value[row] if value.ndim == 2 else value for name, value in many.memory.items()
         }

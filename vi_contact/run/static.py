@@ -137,7 +137,7 @@ class Equilibria:
             self._solve = Proximal(problem, self._K, solver, tolerance).solve
         else:
             certified = CertifiedSolver(problem, self._K, 1.0, [solver], tolerance, advice=ADVICE)
-            self._solve = lambda step: certified.solve(step)[0]
+            self._solve = lambda step: certified.solve(step).result
 
     def solve(self, old: State, t: float) -> State:
         """Return the equilibrium at a time. Collective.

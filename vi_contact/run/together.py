@@ -21,8 +21,8 @@ from typing import Any
 
 import numpy as np
 
+from ..core.algebra import Array, freeze
 from ..core.errors import InputError, ViContactError
-from ..core.products import freeze
 from ..core.stage import Answer, Stage, average, complete, make_matrix, pose
 from ..core.step import Balance, Report, State, StepProblem, StepResult
 from ..core.verify import kkt_residuals
@@ -252,15 +252,15 @@ class Group:
         parts = {"step": steps, "result": LazyRows(answers.own)}
         leaving = list(answers.failed)
         if not leaving:
-            result, leaving = self._judge(many, answers.rows, parts)
+            result, image, leaving = self._judge(many, answers.rows, parts)
         if not leaving:
-            self._finish(stage, complete(stage, many, result), parts, dt)
+            self._finish(stage, many, complete(stage, many, result, image), parts, dt)
         return [runs[row] for row in leaving]
 
     def _judge(
         self, many: StepProblem, rows: StepResult, parts: dict[str, Any]
-    ) -> tuple[StepResult, list[int]]:
-        """Return the answers as rows, and the rows of runs that have to escalate, or fail.
+    ) -> tuple[StepResult, Array, list[int]]:
+        """Return the answers and A d as rows, and the rows of runs that have to escalate, or fail.
 
         Answers that are not good at once are found alone.
 
@@ -271,7 +271,8 @@ class Group:
         """
         steps = parts["step"]
         results = parts["result"]
-        certificates = kkt_residuals(many, rows, lambda row: (steps[row], results[row]))
+        image = many.A @ rows.x
+        certificates = kkt_residuals(many, rows, lambda row: (steps[row], results[row]), image)
         doubtful = [
             row
             for row, certificate in enumerate(certificates)
@@ -281,7 +282,11 @@ class Group:
         for row in doubtful:
             escalated = True
             with suppress(ViContactError):
-                results[row], certificates[row], escalated = self._solver.solve(steps[row])
+                certified = self._solver.solve(steps[row])
+                results[row] = certified.result
+                certificates[row] = certified.certificate
+                image[row] = certified.image
+                escalated = certified.escalated
             if escalated:
                 leaving.append(row)
         if doubtful and not leaving:
@@ -294,13 +299,16 @@ class Group:
                 r_t=None if rows.r_t is None else np.stack([result.r_t for result in own]),
             )
         parts["certificate"] = certificates
-        return rows, leaving
+        return rows, image, leaving
 
-    def _finish(self, stage: Stage, answer: Answer, parts: dict[str, Any], dt: float) -> None:
+    def _finish(
+        self, stage: Stage, many: StepProblem, answer: Answer, parts: dict[str, Any], dt: float
+    ) -> None:
         """Make states, impacts and reports at the end of a step.
 
         Args:
             stage: of all runs.
+            many: the step that was posed of it.
             answer: the certified answers, as rows.
             parts: of the reports, by row, to which the rest is added.
             dt: the length of the step [s].
@@ -310,10 +318,13 @@ class Group:
         old = self._states
         rows = scheme.finish(self._problem, self._many, stage, answer, dt)
         for vector in (rows.u, rows.v, *rows.memory.values()):
-            freeze(vector)  # what is known of them stays true
-        free = split_states(self._problem, problems, rows)
+            freeze(vector)  # the states of the runs are views of them
+        free = split_states(rows)
         self._many, self._states = self._apply_impact(rows, free, dt)
-        whole = cache(partial(average, self._problem, stage, answer))
+        system = self._problem.equations
+        whole = cache(partial(average, self._problem, stage, many, answer))
+        momenta = cache(lambda: system.M @ rows.v)
+        forces = cache(lambda: system.K @ rows.u)
 
         def make_averages(row: int) -> Callable[[], Balance]:
             """Return what makes the balance of one run."""
@@ -325,6 +336,8 @@ class Group:
             "new": self._states,
             "v_minus": LazyRows(lambda row: free[row].v),
             "averages": LazyRows(make_averages),
+            "momentum": LazyRows(lambda row: momenta()[row]),
+            "elastic": LazyRows(lambda row: forces()[row]),
             "escalated": LazyRows(lambda row: False),
         }
         for row, run in enumerate(self._runs):
@@ -350,15 +363,10 @@ class Group:
             # The law takes rows: of all runs at once.
             new = after_impact(problem, scheme, self._many, rows, dt)
             struck = (freeze(new.v) != rows.v).any(axis=1)
-            problems = self._problems
 
             def split_state(row: int) -> State:
                 """Return the state of one run, with its velocities after the impact."""
-                if not struck[row]:
-                    return free[row]
-                v = new.v[row]
-                problems[row].equations.know_rows(problem.equations, row, ("M", v, new.v))
-                return free[row].with_velocity(v)
+                return free[row].with_velocity(new.v[row]) if struck[row] else free[row]
 
             return new, LazyRows(split_state)
 

@@ -188,7 +188,7 @@ def equilibrate(problem: ContactProblem, state: State) -> State:
     # Solve it as any step, and put the answer into the massless unknowns alone.
     solvers = [solver_beside_steps(A, surface)]
     certified = CertifiedSolver(problem, A, 1.0, solvers, TOLERANCE, surface=surface)
-    result, _, _ = certified.solve(step)
+    result = certified.solve(step).result
     u = state.u.copy()
     u[layer] = result.x
     return replace(state, u=u, r_n=result.r_n, r_t=result.r_t, active=result.active)

@@ -169,7 +169,7 @@ def project_predictor(
         k=state.k + 1,
     )
     try:
-        result, _, _ = solver.solve(step)
+        result = solver.solve(step).result
     except StepFailure as failure:
         raise StepFailure(
             f"the predictor could not be brought out of the obstacle: {failure}"

@@ -198,13 +198,19 @@ def balance_at(problem: ContactProblem, state: State, level: str = "") -> Balanc
         level: how these names end there: "_0" in the memory of ``LinearMultistep``.
     """
     surface = problem.surface
+    system = problem.equations
     reaction = state.memory[f"reaction{level}"]
+    a = state.memory[f"a{level}"]
+    forces = system.M @ a + system.K @ state.u
+    if system.C is not None:
+        forces += system.C @ state.v
     return Balance(
         u=state.u,
         v=state.v,
-        a=state.memory[f"a{level}"],
+        a=a,
         f=problem.equations.load_at(state.t),
         r_n=surface.normal_values(reaction),
+        forces=forces,
         r_t=surface.tangential_values(reaction) if problem.frictional else None,
     )
 

@@ -6,16 +6,16 @@ judged.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.algebra import EffectiveMatrix
+from ..core.algebra import Array, EffectiveMatrix
 from ..core.certificate import Certificate
 from ..core.checks import on_all
 from ..core.collective import together_if_own
 from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
-from ..core.products import freeze
 from ..core.step import PreparedSolver, Solver, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
 from ..core.timing import report_time
@@ -28,6 +28,23 @@ TOLERANCE = 1e-9
 NEAR = 1e-2
 FAR = 1e-4  # residuals above are not round-off
 ADVICE = "try a smaller dt or another solver, or check the data of this time"
+
+
+@dataclass(frozen=True)
+class Certified:
+    """Hold an answer with its certificate.
+
+    Attributes:
+        result: the answer.
+        certificate: below the tolerance.
+        escalated: whether it is by a method that was escalated to.
+        image: A x (n,), of which the certificate was made.
+    """
+
+    result: StepResult
+    certificate: Certificate
+    escalated: bool
+    image: Array
 
 
 class CertifiedSolver:
@@ -86,11 +103,8 @@ class CertifiedSolver:
             self._prepared[place] = prepare(self._A, self._surface, self._scale)
         return self._prepared[place]
 
-    def solve(self, step: StepProblem) -> tuple[StepResult, Certificate, bool]:
+    def solve(self, step: StepProblem) -> Certified:
         """Return the first answer whose certificate is below the tolerance. Collective.
-
-        Returns:
-            The answer, its certificate, and whether it is by a method that was escalated to.
 
         Raises:
             StepFailure: no method has such an answer; the error says what each one gave.
@@ -105,17 +119,20 @@ class CertifiedSolver:
             except StepFailure as failure:
                 failures.append(str(failure))
                 continue
-            freeze(result.x)  # products with it are remembered, and have to stay true
-            certificate = kkt_residual(step, result)
+            image = step.A @ result.x
+            certificate = kkt_residual(step, result, image)
 
             # Round-off that comes near the tolerance is corrected; larger residuals have causes
             # that no correction removes, and no solver is asked for more than it aims at.
             goal = NEAR * self._tolerance
             if max(goal, result.aim) < certificate.worst < FAR:
                 solve = self._get(place).solve
+                first = result
                 result, certificate = correct(step, result, certificate, solve, goal)
+                if result is not first:
+                    image = step.A @ result.x
             if certificate.worst <= self._tolerance:
-                return result, certificate, place > 0
+                return Certified(result, certificate, place > 0, image)
             failures.append(f"{result.method}: {certificate}")
         raise StepFailure(
             f"step {step.k} at t = {step.t:.6g} s stayed above the certificate tolerance "

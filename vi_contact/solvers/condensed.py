@@ -24,10 +24,9 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ..core.algebra import Array, EffectiveMatrix, Mask
+from ..core.algebra import Array, EffectiveMatrix, Mask, freeze
 from ..core.checks import instance, provides
 from ..core.problem import ContactProblem
-from ..core.products import freeze
 from ..core.sizes import refuse_dense
 from ..core.step import Answers, StepProblem, StepResult
 from ..core.surfaces import ContactSurface

@@ -24,7 +24,6 @@ from ..core.algebra import Array
 from ..core.certificate import Certificate
 from ..core.collective import ask_limit
 from ..core.errors import StepFailure
-from ..core.products import freeze
 from ..core.protocols import FrictionLaw
 from ..core.step import StepProblem, StepResult
 from ..core.verify import kkt_residual
@@ -179,7 +178,6 @@ def correct(
         except StepFailure:
             break
         better = add(step, result, rest, share)
-        freeze(better.x)
         judged = kkt_residual(step, better)
         if not judged.worst < before:
             break

@@ -87,14 +87,16 @@ class Energy:
         end = new if new.v is report.v_minus else new.with_velocity(report.v_minus)
         with np.errstate(over="ignore", invalid="ignore"):  # the session refuses overflow
             # The step without its impact: from the energies before it to those of v⁻.
-            free = compute_energies(system, new.u, report.v_minus)
+            free = compute_energies(
+                system, new.u, report.v_minus, momentum=report.momentum, elastic=report.elastic
+            )
             step = energy_balance(
                 self._problem, report.old, end, report.balance, before=self._now, after=free
             )
             # The impact law changes velocities, and so the kinetic energy alone.
             self._now = free
             if new.v is not report.v_minus:
-                momentum = system.product("M", new.v)
+                momentum = system.M @ new.v
                 kinetic = 0.5 * system.algebra.dot(new.v, momentum)
                 self._now = Energies(momentum, free.elastic, kinetic, free.strain)
 

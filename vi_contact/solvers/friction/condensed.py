@@ -18,10 +18,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...core.algebra import Array, Mask
+from ...core.algebra import Array, Mask, freeze
 from ...core.collective import ask_limit, ask_slope
 from ...core.errors import ViContactError
-from ...core.products import freeze
 from ...core.step import Answers, StepProblem, StepResult
 from ...core.surfaces import ContactSurface
 from ...kernels.condensation import Condensation
