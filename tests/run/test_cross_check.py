@@ -91,9 +91,8 @@ class Off:
         class Prepared:
             def solve(self, step: Any) -> Any:
                 result = prepared.solve(step)
-                return replace(
-                    result, x=result.x * off.u, r_n=result.r_n * off.r, method="off", iterations=2
-                )
+                x = result.x + (off.u - 1.0) * (step.origin + result.x)
+                return replace(result, x=x, r_n=result.r_n * off.r, method="off", iterations=2)
 
         return Prepared()
 
@@ -126,7 +125,8 @@ class WrongWhenClosing(Off):
         class Prepared:
             def solve(self, step: Any) -> Any:
                 result = right.solve(step)
-                final = np.array_equal(A @ step.guess, off.shortest @ step.guess)
+                ones = np.ones_like(step.b)
+                final = np.array_equal(A @ ones, off.shortest @ ones)
                 return (
                     result
                     if final or not np.any(result.active & ~step.active)

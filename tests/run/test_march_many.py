@@ -157,9 +157,11 @@ def test_reports_hold_what_reports_of_march_hold(steps_together):
         ).max(initial=0.0)
         assert (report.step.t, report.result.iterations) == (alone.t, other.result.iterations)
         assert not hasattr(report, "another")
-        for name, x in (("M", report.v_minus), ("M", report.new.v), ("K", report.new.u)):
-            expected = getattr(report.problem.equations, name) @ x
-            found = report.problem.equations.product(name, x)
+        system = report.problem.equations
+        for found, expected in (
+            (report.momentum, system.M @ report.v_minus),
+            (report.elastic, system.K @ report.new.u),
+        ):
             assert np.abs(found - expected).max(initial=0.0) <= 1e-13 * np.abs(expected).max(
                 initial=0.0
             )

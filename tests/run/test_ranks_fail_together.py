@@ -235,8 +235,8 @@ class Own(vc.ZienkiewiczWoodTaylor):
             raise ZeroDivisionError(where)
         return value
 
-    def step(self, *given: Any) -> Any:
-        return self.told("step", super().step(*given))
+    def stage(self, *given: Any) -> Any:
+        return self.told("stage", super().stage(*given))
 
     def finish(self, *given: Any) -> Any:
         return self.told("finish", super().finish(*given))
@@ -245,7 +245,7 @@ class Own(vc.ZienkiewiczWoodTaylor):
         return self.told("start", super().start(*given))
 
 
-@pytest.mark.parametrize("where", ["start", "step", "finish"])
+@pytest.mark.parametrize("where", ["start", "stage", "finish"])
 def test_a_scheme_of_the_users_own(comm: Any, where: str) -> None:
     """On its own rank the error stays as it is; the others name it."""
     with pytest.raises((ZeroDivisionError, vc.ViContactError), match=where):

@@ -22,6 +22,7 @@ from vi_contact.laws.impact import Elastic
 from vi_contact.run.files.checkpoint import compute_checksum
 from vi_contact.run.files.identity import find_differences, identify, write_as_text
 from vi_contact.run.simulate import simulate
+from vi_contact.schemes.hht import HHT
 from vi_contact.schemes.ss22 import SS22
 from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
@@ -216,7 +217,7 @@ def _about(arrays: dict[str, Any], **changes: Any) -> None:
     arrays["about"] = np.array(json.dumps(json.loads(str(arrays["about"])) | changes))
 
 
-PLAIN: dict[str, Any] = {"scheme": Trapezoidal(), "problem": chain(impact=None)}
+PLAIN: dict[str, Any] = {"scheme": HHT(), "problem": chain(impact=None)}
 
 
 @pytest.fixture(scope="module")

@@ -125,8 +125,7 @@ def box(**data: Any) -> vc.ContactProblem:
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_step_and_its_certificate(kind: str, traffic: Traffic) -> None:
     """From a prediction that is all wrong. The solver's products are its own; the certificate has
-    two, M x and K x, which the ledger and the next step use again, and one reduction where there
-    are several ranks."""
+    one, A d, which the ledger uses again, and one reduction where there are several ranks."""
     problem, scheme = box(), vc.Midpoint()
     assert problem.surface.total > 2 * DOZEN
     state = initial_state(problem)
@@ -140,7 +139,7 @@ def test_a_step_and_its_certificate(kind: str, traffic: Traffic) -> None:
     assert kkt_residual(step, result).worst <= 1e-9
     assert (
         traffic.small
-        and traffic.products == made + 2
+        and traffic.products == made + 1
         and len(traffic.sizes) == sent + (COMM.size > 1)
     )
 

@@ -224,11 +224,11 @@ def test_gaps_slips_and_states_that_are_no_numbers():
 class Wild(vc.Trapezoidal):
     """A scheme of a user's own that guesses NaN at one place."""
 
-    def step(self, problem: Any, state: Any, A: Any, dt: float) -> Any:
-        step = super().step(problem, state, A, dt)
-        guess = step.guess.copy()
+    def stage(self, problem: Any, state: Any, dt: float) -> Any:
+        stage = super().stage(problem, state, dt)
+        guess = stage.guess.copy()
         guess[problem.system.space.ids == 3] = NAN
-        return replace(step, guess=guess)
+        return replace(stage, guess=guess)
 
 
 def test_the_guess_of_a_scheme():

@@ -141,18 +141,26 @@ class PreparedCrossCheck:
         result = self.solvers[0].solve(step)
         self.settings.begin(step)
         for solver, disagreement in zip(self.solvers[1:], self.settings.found, strict=True):
-            self._compare(result, solver.solve(step), disagreement)
+            self._compare(step, result, solver.solve(step), disagreement)
         return result
 
-    def _compare(self, result: StepResult, other: StepResult, disagreement: Disagreement) -> None:
+    def _compare(
+        self, step: StepProblem, result: StepResult, other: StepResult, disagreement: Disagreement
+    ) -> None:
         """Take the differences of two answers to a step into ``disagreement``. Collective.
 
         Args:
+            step: the step.
             result: of the primary solver.
             other: of the solver that is compared with it.
             disagreement: of this solver so far.
         """
-        pairs = {"u": (other.x, result.x), "r_n": (other.r_n, result.r_n)}
+        # Differences of u are judged by the size of u, not by that of an increment.
+        origin = 0.0 if step.origin is None else step.origin
+        pairs = {
+            "u": (origin + other.x, origin + result.x),
+            "r_n": (other.r_n, result.r_n),
+        }
         if result.r_t is not None:
             other_r_t = np.zeros_like(result.r_t) if other.r_t is None else other.r_t
             pairs["r_t"] = (other_r_t, result.r_t)

@@ -135,15 +135,15 @@ def split_step(problem: ContactProblem, many: StepProblem, row: int) -> StepProb
     )
 
 
-def split_balance(many: Balance, row: int) -> Balance:
+def split_balance(many: Callable[[], Balance], row: int) -> Balance:
     """Return the mean equation of one run.
 
     Args:
-        many: that of all runs, with rows.
+        many: makes that of all runs, with rows.
         row: of the run.
     """
     values: dict[str, Any] = {}
-    for name, value in vars(many).items():
+    for name, value in vars(many()).items():
         values[name] = None if value is None else value[row]
     return Balance(**values)
 

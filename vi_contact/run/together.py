@@ -328,7 +328,7 @@ class Group:
 
         def make_averages(row: int) -> Callable[[], Balance]:
             """Return what makes the balance of one run."""
-            return lambda: split_balance(whole(), row)
+            return partial(split_balance, whole, row)
 
         parts |= {
             "problem": problems,

@@ -97,6 +97,7 @@ def pose_remainder(step: StepProblem, answer: StepResult, share: float) -> StepP
         b=step.b - step.A @ x - surface.reaction_load(r_n, len(x), r_t),
         bound=step.bound - surface.normal_values(x) + surface.compliance * r_n / step.scale,
         guess=np.zeros_like(x),
+        origin=x if step.origin is None else step.origin + x,
         active=answer.active,
         friction=friction,
         slip0=slip0,

@@ -34,7 +34,8 @@ def refuse_nan(step: StepProblem, source: Source | None = None) -> None:
     """
     # Inner products are the quickest look there is. One that overflows is looked into.
     slip0 = step.slip0
-    is_fine = isfinite(step.b.dot(step.guess))
+    guess = step.guess if step.origin is None else step.origin
+    is_fine = isfinite(step.b.dot(guess))
     is_fine = is_fine and not isnan(step.bound.dot(step.bound))  # infinite gaps never close
     is_fine = is_fine and (slip0 is None or isfinite(np.vdot(slip0, slip0)))
     if largest(step.surface.comm, not is_fine):
@@ -47,12 +48,13 @@ def _refuse(step: StepProblem, source: Source | None) -> None:
     Where numbers are only large, and their inner product overflowed, there is none.
     """
     surface = step.surface
+    guess = step.guess if step.origin is None else step.origin
     space = step.A.space
     nodes = None if space is None else space.coordinates
     nan_gaps = np.where(np.isnan(step.bound), np.nan, 0.0)
     arrays: tuple[tuple[str, Array | None, Array | None, str], ...] = (
         ("load", step.b, nodes, DATA),
-        ("guess", step.guess, nodes, "check the state that the step begins with, and the scheme"),
+        ("guess", guess, nodes, "check the state that the step begins with, and the scheme"),
         ("gap", nan_gaps, surface.points, "check how the obstacle moves"),
         ("slip", step.slip0, surface.points, "check how the obstacle slides, and the state"),
     )
