@@ -20,7 +20,7 @@ import numpy as np
 from mpi4py import MPI
 
 # first: it sets the number of threads
-from step_cost import SCHEME, Factors, Linear, StepsWithContact, wall_cells
+from step_cost import Factors, Linear, StepsWithContact, make_effective, wall_cells
 
 import vi_contact as vc
 from demos.parts.problems.wall import Wall, build
@@ -76,7 +76,7 @@ def measure(size: float, steps: int, mu: float) -> None:
     vertical = vc.Harmonic(3.0, 20.0, direction=(0.0, 1.0))
     plain = replace(shaken, excitation=(*shaken.excitations, vertical))
     dt = model.time_step()
-    linear = Linear(plain, dt, Factors(SCHEME.effective_matrix(plain, dt).matrix, 2).by)
+    linear = Linear(plain, dt, Factors(make_effective(plain, dt).matrix, 2).by)
     for name, solver in {"no friction": vc.Condensed(), **ROUTES}.items():
         problem = plain if name == "no friction" else replace(plain, friction=vc.Coulomb(mu))
         f = measured(problem, solver, dt, steps, linear)

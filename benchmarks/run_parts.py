@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -109,7 +110,7 @@ def watched(clock: Clock) -> Iterator[None]:
     places: list[tuple[str, Any, str]] = [
         ("set-up", condensed, "condense"),
         ("set-up", ActiveSet, "prepare"),
-        ("set-up", type(SCHEME), "effective_matrix"),
+        ("set-up", sys.modules["vi_contact.run.march"], "make_matrix"),
         ("forward", ContactLast, "forward"),
         ("small problem", PreparedSets, "solve"),
         ("backward", ContactLast, "backward"),

@@ -37,6 +37,7 @@ from mpi4py import MPI  # noqa: E402
 import vi_contact as vc  # noqa: E402
 from demos.parts.problems.bar import Bar, build  # noqa: E402
 from vi_contact import fem  # noqa: E402
+from vi_contact.core.stage import complete, pose  # noqa: E402
 from vi_contact.exact.bar import PeriodicBar, ThrownBar  # noqa: E402
 from vi_contact.meshes.block import BlockMesh  # noqa: E402
 
@@ -121,10 +122,10 @@ def linear_step(report: Any, scheme: Any, dt: float) -> float:
     A = report.step.A
     none = np.zeros(problem.surface.count)
     begin = time.perf_counter()
-    step = scheme.step(problem, old, A, dt)
-    scheme.finish(
-        problem, old, step, vc.StepResult(A.factor.solve(step.b), none, none > 0.0, 0, "linear"), dt
-    )
+    stage = scheme.stage(problem, old, dt)
+    step = pose(problem, stage, A)
+    result = vc.StepResult(A.factor.solve(step.b), none, none > 0.0, 0, "linear")
+    scheme.finish(problem, old, stage, complete(stage, step, result, A @ result.x), dt)
     return time.perf_counter() - begin
 
 

@@ -42,6 +42,7 @@ from scipy.sparse.linalg import splu  # noqa: E402
 
 import vi_contact as vc  # noqa: E402
 from demos.parts.problems.wall import Wall, build  # noqa: E402
+from vi_contact.core.stage import make_matrix  # noqa: E402
 from vi_contact.core.state_checks import initial_state  # noqa: E402
 
 SCHEME = vc.ZienkiewiczWoodTaylor(phi=0.5)
@@ -218,6 +219,7 @@ def measured(steps: int, rounds: int) -> list[dict[str, Any]]:
             found["bare"] += [before, after]
             found[name].append(own)
             ratios[name].append(2.0 * own / (before + after))
+    first = SCHEME.stage(problem, initial_state(problem), dt)
     factorisation = spent(lambda: make_matrix(problem.equations, first).factor)[0]
     set_up = spent(lambda: next(vc.march(problem, scheme=SCHEME, dt=dt, steps=1)))[0]
     common = {

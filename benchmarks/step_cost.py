@@ -49,6 +49,7 @@ from demos.parts.problems import channel  # noqa: E402
 from demos.parts.problems.wall import Wall, build  # noqa: E402
 from vi_contact import fem  # noqa: E402
 from vi_contact.core.algebra import EffectiveMatrix, SerialComm  # noqa: E402
+from vi_contact.core.stage import complete, make_matrix, pose  # noqa: E402
 from vi_contact.core.state_checks import initial_state  # noqa: E402
 from vi_contact.fem.matrices.petsc_algebra import PREFIX, PetscFactor  # noqa: E402
 from vi_contact.kernels import contact_last  # noqa: E402
@@ -207,6 +208,12 @@ def repeated(work: Callable[[], Any], rows: int) -> tuple[float, Any]:
     return float(np.median([seconds for seconds, _ in found])), found[-1][1]
 
 
+def make_effective(problem: vc.ContactProblem, dt: float) -> EffectiveMatrix:
+    """Return the matrix of steps of dt [s]."""
+    state = initial_state(problem)
+    return make_matrix(problem.equations, SCHEME.stage(problem, state, dt))
+
+
 @dataclass
 class Linear:
     """Take plain linear steps by several factors of the matrix of the problem.
@@ -219,7 +226,7 @@ class Linear:
     factors: dict[str, Any]
 
     def __post_init__(self) -> None:
-        self.A = SCHEME.effective_matrix(self.problem, self.dt)
+        self.A = make_effective(self.problem, self.dt)
         self.seconds: dict[str, list[float]] = {name: [] for name in self.factors}
         self.state = initial_state(self.problem)
         self.none = np.zeros(self.problem.surface.count)
@@ -232,9 +239,11 @@ class Linear:
         self.state = state
 
     def _step(self, factor: Any) -> vc.State:
-        step = SCHEME.step(self.problem, self.state, self.A, self.dt)
+        stage = SCHEME.stage(self.problem, self.state, self.dt)
+        step = pose(self.problem, stage, self.A)
         result = vc.StepResult(factor.solve(step.b), self.none, self.none > 0.0, 0, "linear")
-        return SCHEME.finish(self.problem, self.state, step, result, self.dt)
+        answer = complete(stage, step, result, self.A @ result.x)
+        return SCHEME.finish(self.problem, self.state, stage, answer, self.dt)
 
     def fastest(self) -> str:
         """Return the name of the factor whose steps are the fastest."""
@@ -243,7 +252,7 @@ class Linear:
 
 def set_up(problem: vc.ContactProblem, dt: float, scale: float) -> float:
     """Return the seconds to order, factorise and condense, once more from nothing."""
-    matrix = SCHEME.effective_matrix(problem, dt)
+    matrix = make_effective(problem, dt)
 
     def condensed() -> Any:
         A = EffectiveMatrix(matrix.matrix, matrix.algebra)
@@ -305,7 +314,7 @@ def measured(name: str, size: float, count: int) -> Iterator[dict[str, Any]]:
     for friction in (None, RUBBING):
         problem, dt, state = PROBLEMS[name](size, friction)
         if factors is None:
-            matrix = SCHEME.effective_matrix(problem, dt).matrix
+            matrix = make_effective(problem, dt).matrix
             factors = Factors(matrix, problem.surface.points.shape[1])
         yield measure(name, (problem, dt, state), factors, count)
 

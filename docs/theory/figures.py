@@ -31,6 +31,8 @@ import scipy.sparse as sp  # noqa: E402
 import vi_contact as vc  # noqa: E402
 from vi_contact import solvers  # noqa: E402
 from vi_contact.core import kkt_residual  # noqa: E402
+from vi_contact.core.stage import make_matrix  # noqa: E402
+from vi_contact.core.state_checks import initial_state  # noqa: E402
 from vi_contact.exact.bar import PeriodicBar, ThrownBar  # noqa: E402
 from vi_contact.exact.bouncing_bar import BouncingBar  # noqa: E402
 from vi_contact.practice.plots.histories import canvas, save  # noqa: E402
@@ -475,7 +477,8 @@ def condensation(path: Path) -> list[str]:
     position, flexibility = surface.points[order, 0], {}
     for courant in (1.0, 4.0, 16.0):
         dt = courant / 60.0 / c
-        A = vc.Midpoint().effective_matrix(problem, dt)
+        stage = vc.Midpoint().stage(problem, initial_state(problem), dt)
+        A = make_matrix(problem.equations, stage)
         flexibility[courant] = (
             vc.Condensed().prepare(A, surface, 2.0).delassus[np.ix_(order, order)]
         )
