@@ -110,7 +110,7 @@ def watched(clock: Clock) -> Iterator[None]:
     places: list[tuple[str, Any, str]] = [
         ("set-up", condensed, "condense"),
         ("set-up", ActiveSet, "prepare"),
-        ("set-up", sys.modules["vi_contact.run.march"], "make_matrix"),
+        ("set-up", sys.modules["vi_contact.run.stepper"], "make_matrix"),
         ("forward", ContactLast, "forward"),
         ("small problem", PreparedSets, "solve"),
         ("backward", ContactLast, "backward"),

@@ -148,7 +148,8 @@ def told(*_, **__):
     print(time.process_time(), flush=True)
     os._exit(0)
 
-import_module("vi_contact.run.march").March._attempt = told  # imported by the command in any case
+# imported by the command in any case
+import_module("vi_contact.run.stepper").Stepper._attempt = told
 from vi_contact.practice.cli.entry import main
 main(["run", "wall", "--quiet", "--out", sys.argv[1]])
 """

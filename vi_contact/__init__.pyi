@@ -57,6 +57,7 @@ from .run import BodyMotion as BodyMotion
 from .run import Contact as Contact
 from .run import CrossChecked as CrossChecked
 from .run import Energy as Energy
+from .run import ErrorControlled as ErrorControlled
 from .run import HalvedAtImpact as HalvedAtImpact
 from .run import LargestStrain as LargestStrain
 from .run import Probe as Probe
@@ -66,6 +67,7 @@ from .run import Resultants as Resultants
 from .run import Schedule as Schedule
 from .run import SectionForces as SectionForces
 from .run import Solution as Solution
+from .run import Stepper as Stepper
 from .run import contact_values as contact_values
 from .run import cross_check as cross_check
 from .run import march as march

@@ -112,7 +112,7 @@ def test_round_off_of_many_pieces_adds_no_step(t0):
         (-1.0, 5, None, "positive time step"),
         (np.nan, 5, None, "positive time step"),
         (np.inf, 5, None, "positive time step"),
-        ("0.1", 5, None, "positive time step in seconds, a Schedule or HalvedAtImpact"),
+        ("0.1", 5, None, "positive time step in seconds, a Schedule, HalvedAtImpact"),
         (0.1, 5, 0.5, "not both"),
         (0.1, None, None, "either steps or t_end"),
         (0.1, -1, None, "steps is -1"),
@@ -302,7 +302,7 @@ class Counted:
 
     def __init__(self, monkeypatch):
         self.made: list[tuple[float, Any]] = []
-        loop = sys.modules["vi_contact.run.march"]  # the name march is its function
+        loop = sys.modules["vi_contact.run.stepper"]
         monkeypatch.setattr(loop, "make_matrix", self._make)
 
     def _make(self, system, stage):

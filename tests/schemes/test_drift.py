@@ -30,8 +30,8 @@ SPEED = 30.0  # of waves [m/s]
 )
 @pytest.mark.parametrize("courant", [0.02, 0.5])
 def test_the_energy_of_a_flying_bar_stays(solver: Any, most: float, courant: float) -> None:
-    """A bar that flies and swings under the midpoint rule, which keeps its energy exactly. Steps for
-    the whole displacement lost up to 2e-10 of it in so many steps, and went on in one direction;
+    """A bar flies and swings under the midpoint rule, which keeps its energy exactly. Steps for the
+    whole displacement lost up to 2e-10 of it in so many steps, and went on in one direction;
     increments lose 4e-13."""
     problem = bar(
         ELEMENTS,

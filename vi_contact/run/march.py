@@ -1,29 +1,23 @@
 """March: the one time loop, a generator over certified steps.
 
-A *base step* is one of the plan (``time_steps``). ``HalvedAtImpact`` may make it in halves, which
-are certified steps like any other. Every step is made in the order that ``core.step`` states:
-
-    scheme.stage -> pose -> solver.solve with its certificate -> scheme.finish -> impact law ->
-    scheme.jump
-
-Whatever a user's own function raises on one rank within ``with together(comm)`` is raised on all
-ranks at its end.
+A *base step* is one of the plan (``time_steps``). ``HalvedAtImpact`` and ``ErrorControlled`` may
+make it in halves, which are certified steps like any other. Each is an attempt of a ``Stepper``,
+which is accepted or made again in halves.
 """
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 
 import numpy as np
 
-from ..core.algebra import EffectiveMatrix, freeze
-from ..core.collective import call_user, together, together_if_own
+from ..core.algebra import max_abs
+from ..core.collective import together
+from ..core.errors import StepFailure
 from ..core.problem import ContactProblem
-from ..core.protocols import Impact
-from ..core.stage import average, complete, make_matrix, pose
 from ..core.state_checks import initial_state
 from ..core.step import Report, Scheme, Solver, State
-from ..solvers.certified import TOLERANCE, CertifiedSolver
+from ..solvers.certified import TOLERANCE
 from .method import Method, choose_method
+from .stepper import Stepper
 from .time_steps import StepPlan, TimeSteps, plan_steps
 
 
@@ -46,7 +40,7 @@ def march(
             ``run.method.with_defaults`` chooses them, and ``report.problem`` has them.
         scheme: the time scheme.
         solver: of the steps; None means Automatic().
-        dt: constant [s], or a Schedule, or HalvedAtImpact.
+        dt: constant [s], or a Schedule, HalvedAtImpact or ErrorControlled.
         steps: the number of base steps. The halves of a halved step are yielded one by one, and
             ``state.k`` counts them, but they are one of the ``steps``.
         t_end: the time [s] at which the base steps end; give it or ``steps``.
@@ -75,18 +69,15 @@ def march(
     return iter(March(method, plan_steps(dt, steps, t_end, state.t), state))
 
 
-class March:
+class March(Stepper):
     """Step along a plan, and keep the books of it.
 
-    Attributes, at the time a step is handed out:
-        method: scheme, solvers and tolerance.
+    Attributes, at the time a step is handed out, beside those of ``Stepper``:
         step_plan: all base steps of the run.
-        state: at its end.
         base: base steps done.
         ended: whether this step ended one, so that a restart may begin here.
-        dt: the length of this step [s]; nan before the first.
         halved: attempts that were thrown away.
-        prepared: length of a step [s] -> its effective matrix and solver, one factor each.
+        largest: displacement so far [m], by which errors are measured.
     """
 
     def __init__(
@@ -101,14 +92,12 @@ class March:
             base: how many have been made.
             halved: attempts that have been thrown away.
         """
-        self.method = method
+        self._stand(method, state)
         self.step_plan = step_plan
-        self.state = state
         self.base = base
         self.halved = halved
         self.ended = True
-        self.dt = float("nan")
-        self.prepared: dict[float, tuple[EffectiveMatrix, CertifiedSolver]] = {}
+        self.largest = 0.0
 
     def __iter__(self) -> Iterator[tuple[State, Report]]:
         """Make base steps, whole or in halves, until the plan ends."""
@@ -128,133 +117,115 @@ class March:
             self.state = self._convert_state(dt)
             self.dt = dt
 
-            # The parts of the base step that are left, last first: how often each was halved. A
-            # part that closes a point is thrown away, and its two halves take its place.
-            levels = [0]
-            while levels:
-                level = levels.pop()
-                report = self._attempt(sizes[level], final=level == self.step_plan.halvings)
-                if report is None:
-                    self.halved += 1
-                    levels += [level + 1, level + 1]
-                    continue
+            if self.step_plan.error is None:
+                reports = self._halve_at_impact(sizes)
+            else:
+                reports = self._halve_by_error(sizes)
+            for report, size, ended in reports:
                 self.state = report.new
-                self.dt = sizes[level]
-                self.ended = not levels
-                if self.ended:
+                self.dt = size
+                self.ended = ended
+                if ended:
                     self.base += 1
                 yield report.new, report
 
-    def _convert_state(self, dt: float) -> State:
-        """Return the state, with the scheme's memory of a past in steps of dt [s]."""
-        if dt == self.dt:
-            return self.state
-        method = self.method
-        with together(method.problem.surface.comm):  # it may ask for loads, which are the user's
-            return method.scheme.start(method.problem, self.state, dt)
+    def _halve_at_impact(self, sizes: list[float]) -> Iterator[tuple[Report, float, bool]]:
+        """Yield the parts of a base step, their lengths [s] and whether each ends it.
 
-    def _attempt(self, dt: float, *, final: bool) -> Report | None:
-        """Return a step of dt [s]; None when it closes a point and is to be halved.
+        Args:
+            sizes: lengths of its parts by how often they were halved [s].
+        """
+        # The parts of the base step that are left, last first: how often each was halved. A part
+        # that closes a point, or that no solver can do, is thrown away, and its two halves take its
+        # place.
+        levels = [0]
+        while levels:
+            level = levels.pop()
+            report = self._try(sizes[level], may_halve=level < self.step_plan.halvings)
+            if report is None:
+                self.halved += 1
+                levels += [level + 1, level + 1]
+                continue
+            yield report, sizes[level], not levels
 
-        The march is then as it was before. Loads, motions and laws are the user's, and may fail on
-        one rank: all ranks are asked once, at its end.
+    def _halve_by_error(self, sizes: list[float]) -> Iterator[tuple[Report, float, bool]]:
+        """Yield the parts of a base step as ``_halve_at_impact`` does, by step doubling.
+
+        Args:
+            sizes: lengths of its parts by how often they were halved [s].
+        """
+        # The parts that are left, last first, each with its whole attempt where there is one.
+        parts: list[tuple[int, Report | None]] = [(0, None)]
+        while parts:
+            level, report = parts.pop()
+            if level == self.step_plan.halvings:
+                report = report or self._attempt(sizes[level])
+                yield report, sizes[level], not parts
+                continue
+
+            # The same way once whole and once in halves, from the same state.
+            report = report or self._attempt_or_none(sizes[level])
+            first, second = self._attempt_halves(sizes[level + 1])
+            if report is None or second is None or not self._agree(report.new, second.new):
+                # The first half, which has been made, is now a whole part of the next level.
+                self.halved += 1
+                parts += [(level + 1, None), (level + 1, first)]
+                continue
+            if first is not None:
+                yield first, sizes[level + 1], False
+            yield second, sizes[level + 1], not parts
+
+    def _attempt_or_none(self, dt: float) -> Report | None:
+        """Return a step of dt [s] from the state; None where no solver can do it."""
+        try:
+            return self._attempt(dt)
+        except StepFailure:
+            return None
+
+    def _attempt_halves(self, dt: float) -> tuple[Report | None, Report | None]:
+        """Return two steps of dt [s] one after the other; None for one that cannot be done.
+
+        The march stands where it stood.
+        """
+        start = self.state
+        before = self.dt
+        first = self._attempt_or_none(dt)
+        second = None
+        if first is not None:
+            self.state = first.new
+            self.dt = dt
+            second = self._attempt_or_none(dt)
+        self.state = start
+        self.dt = before
+        return first, second
+
+    def _agree(self, whole: State, halves: State) -> bool:
+        """Tell whether two ends of the same way are as near as the plan asks. Collective.
+
+        Args:
+            whole: after one step.
+            halves: after two steps.
+        """
+        comm = self.method.problem.surface.comm
+        apart = max_abs(whole.u - halves.u)
+        apart, size = comm.max(np.array([apart, max_abs(halves.u)]))
+        self.largest = max(self.largest, float(size))
+        return bool(apart <= (self.step_plan.error or 0.0) * self.largest)
+
+    def _try(self, dt: float, *, may_halve: bool) -> Report | None:
+        """Return a step of dt [s]; None when it is to be halved.
+
+        The march is then as it was before.
 
         Args:
             dt: the length of the step [s].
-            final: whether it is accepted in any case, as the plan allows no more halves.
+            may_halve: whether the plan allows halves of it; else it is accepted in any case.
         """
-        with together(self.method.problem.surface.comm):
-            return self._make_step(dt, final=final)
-
-    def _make_step(self, dt: float, *, final: bool) -> Report | None:
-        """Do the work of ``_attempt``, in its frame of all ranks."""
-        problem = self.method.problem
-        scheme = self.method.scheme
-        state = self._convert_state(dt)
-
-        # The scheme says where the balance holds: one inequality A d = b with contact.
-        with together_if_own(problem.surface.comm, scheme):
-            stage = scheme.stage(problem, state, dt)
-        if dt not in self.prepared:
-            method = self.method
-            A = make_matrix(problem.equations, stage)
-            solver = CertifiedSolver(problem, A, stage.scale, method.solvers, method.tolerance)
-            self.prepared[dt] = (A, solver)
-        A, solver = self.prepared[dt]
-        step = pose(problem, stage, A)
-        if hasattr(scheme, "press"):  # a law of its own at the contact
-            with together_if_own(problem.surface.comm, scheme):
-                stage = scheme.press(problem, state, stage, step, dt)
-            step = pose(problem, stage, A)
-
-        # It is solved with a certificate, and thrown away if it is too long for an impact, which is
-        # where a point closes that was open before.
-        if problem.surface.watched:
-            problem.surface.refuse_driven(step.t)
-        certified = solver.solve(step)
-        result = certified.result
-        if not final and problem.surface.some(result.active & ~state.active):
+        if not may_halve:
+            return self._attempt(dt)
+        try:
+            report = self._attempt(dt)
+        except StepFailure:
             return None
-
-        # Displacements and velocities at its end: of the scheme, then of the impact law.
-        answer = complete(stage, step, result, certified.image)
-        with together_if_own(problem.surface.comm, scheme):
-            free = scheme.finish(problem, state, stage, answer, dt)
-        with together_if_own(problem.surface.comm, problem.impact or scheme):
-            new = after_impact(problem, scheme, state, free, dt)
-        for vector in (free.u, free.v, new.u, new.v):
-            freeze(vector)  # states are handed out, and the next step is made of them
-
-        return Report(
-            problem=problem,
-            old=state,
-            new=new,
-            v_minus=free.v,
-            step=step,
-            result=result,
-            certificate=certified.certificate,
-            # formed only if some recorder asks for it
-            averages=partial(average, problem, stage, step, answer),
-            escalated=certified.escalated,
-        )
-
-
-def after_impact(
-    problem: ContactProblem, scheme: Scheme, old: State, new: State, dt: float
-) -> State:
-    """Return the state with the impact law applied: its velocities, after the step.
-
-    The law says which normal velocities closed points have after an impact, from those before the
-    step; nan leaves a point alone. ``law.apply`` finds the velocities v of all unknowns with these,
-    by an impulse at the points, and the scheme writes the jump into its state. Points on massless
-    supports (springs) do not collide.
-
-    Args:
-        problem: whose law it is.
-        scheme: which writes the jump of velocities into its state.
-        old: the state before the step.
-        new: the one after it, without impact.
-        dt: the length of the step [s].
-    """
-    law = problem.impact
-    surface = problem.surface
-    if law is None:
-        return new
-    active = new.active & surface.rigid
-    if not surface.some(active):
-        return new
-    impact = Impact(
-        before=surface.normal_values(old.v),
-        v_n=surface.normal_values(new.v),
-        active=active,
-        closing=active & ~old.active,
-    )
-    target = call_user(
-        f"the impact law {type(law).__name__}",
-        lambda: law.target(impact),
-        np.full(surface.count, np.nan),
-    )
-    if not surface.some(~np.isnan(target)):
-        return new
-    v = law.apply(problem.equations, surface, new.v, target)
-    return scheme.jump(problem, new, v, dt)
+        closes = report.result.active & ~report.old.active
+        return None if self.method.problem.surface.some(closes) else report

@@ -1,6 +1,7 @@
 """Plan how long the steps of a run are.
 
-This is a constant dt [s], a ``Schedule``, or steps halved where contact closes.
+This is a constant dt [s], a ``Schedule``, or steps halved where contact closes or where their
+error is too large.
 
 Changing dt changes neither u nor v, and so no energy. A scheme that carries its past restarts it
 from them (``start``). ``steps``, ``t_end``, ``checkpoint_every`` and progress count *base steps*:
@@ -84,12 +85,53 @@ class HalvedAtImpact:
         object.__setattr__(self, "halvings", _read(whole, self.halvings, remedy, most=HALVINGS))
 
 
-TimeSteps = float | Schedule | HalvedAtImpact
+@dataclass(frozen=True)
+class ErrorControlled:
+    """Plan steps of ``dt`` [s], or of a Schedule, halved where their error is too large.
+
+    The error of a step is found by doubling: it is made once whole and once in two halves, from the
+    same state, and
+
+        error = max |u_whole - u_halves| / max |u|
+
+    where the second maximum is over all steps so far. The halves are accepted if the error is at
+    most ``relative``; otherwise each half is judged in the same way, down to dt/2**halvings. The
+    part with an impact goes down alone, and the next base step begins whole again, so that step
+    sizes do not chatter. A base step costs three steps for two that are accepted. At most one
+    matrix is factorised for each of the halvings + 1 lengths of a piece.
+
+    Raises:
+        InputError: dt or relative is not positive, or halvings is not a whole number from 1 to 20.
+    """
+
+    dt: Annotated[float | Schedule, Unit("s")]
+    relative: float = 1e-3
+    halvings: int = 6
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.dt, Schedule):
+            object.__setattr__(self, "dt", _read_dt(self.dt))
+        remedy = (
+            f"ErrorControlled halvings is {quote(self.halvings)}: give a whole number from 1 to "
+            f"{HALVINGS}"
+        )
+        halvings = _read(whole, self.halvings, remedy, least=1, most=HALVINGS)
+        object.__setattr__(self, "halvings", halvings)
+        remedy = (
+            f"ErrorControlled relative is {quote(self.relative)}: give a positive part of the "
+            "largest displacement, such as 1e-3"
+        )
+        object.__setattr__(self, "relative", _read(number, self.relative, remedy, positive=True))
+
+
+TimeSteps = float | Schedule | HalvedAtImpact | ErrorControlled
 
 
 def describe_plan(plan: TimeSteps) -> float | str:
     """Return, for checkpoint and summary, a constant dt as the number it is, a plan in words."""
-    return repr(plan) if isinstance(plan, Schedule | HalvedAtImpact) else plan
+    if isinstance(plan, Schedule | HalvedAtImpact | ErrorControlled):
+        return repr(plan)
+    return plan
 
 
 def list_pieces(plan: TimeSteps) -> tuple[tuple[float, float], ...]:
@@ -98,7 +140,7 @@ def list_pieces(plan: TimeSteps) -> tuple[tuple[float, float], ...]:
     Raises:
         InputError: there is no dt.
     """
-    dt = plan.dt if isinstance(plan, HalvedAtImpact) else plan
+    dt = plan.dt if isinstance(plan, HalvedAtImpact | ErrorControlled) else plan
     return dt.pieces if isinstance(dt, Schedule) else ((_read_dt(dt), inf),)
 
 
@@ -106,11 +148,13 @@ def list_pieces(plan: TimeSteps) -> tuple[tuple[float, float], ...]:
 class StepPlan:
     """Hold the base steps of one run.
 
-    These are parts (dt, number of steps), and how often each may be halved.
+    These are parts (dt, number of steps), how often each may be halved, and the error above which
+    it is; without an error, it is halved where contact closes.
     """
 
     parts: tuple[tuple[float, int], ...]
     halvings: int = 0
+    error: float | None = None
 
     @cached_property
     def steps(self) -> int:
@@ -150,7 +194,8 @@ def plan_steps(
     Raises:
         InputError: plan, steps or t_end make no sense, or there are more than 1e9 steps.
     """
-    halvings = plan.halvings if isinstance(plan, HalvedAtImpact) else 0
+    halvings = plan.halvings if isinstance(plan, HalvedAtImpact | ErrorControlled) else 0
+    error = plan.relative if isinstance(plan, ErrorControlled) else None
     pieces = list_pieces(plan)
     left = _limit_steps(steps, t_end, t0)
     parts: list[tuple[float, int]] = []
@@ -172,7 +217,7 @@ def plan_steps(
             parts.append((size, count))
         left = 0 if last else left - count
         if left == 0:
-            return StepPlan(tuple(parts), halvings)
+            return StepPlan(tuple(parts), halvings, error)
         # The next piece begins where the plan says, or where the last step went beyond that.
         t += count * size
         if abs(t - until) <= SLACK * size:
@@ -215,9 +260,8 @@ def _limit_steps(steps: int | None, t_end: float | None, t0: float) -> float:
 
 def _read_dt(dt: Any) -> float:
     """Return a time step [s] as a float; InputError for what is none."""
-    remedy = (
-        f"dt is {quote(dt)}: give a positive time step in seconds, a Schedule or HalvedAtImpact"
-    )
+    plans = "a Schedule, HalvedAtImpact or ErrorControlled"
+    remedy = f"dt is {quote(dt)}: give a positive time step in seconds, {plans}"
     size = float(_read(number, dt, remedy, positive=True))
     if not 1.0 / LONGEST < size < LONGEST:
         raise InputError(

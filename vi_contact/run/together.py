@@ -27,7 +27,7 @@ from ..core.stage import Answer, Stage, average, complete, make_matrix, pose
 from ..core.step import Balance, Report, State, StepProblem, StepResult
 from ..core.verify import kkt_residuals
 from ..solvers.certified import NEAR, CertifiedSolver
-from .march import March, after_impact
+from .march import March
 from .method import Method
 from .rows import (
     LazyRows,
@@ -38,6 +38,7 @@ from .rows import (
     split_states,
     split_step,
 )
+from .stepper import after_impact
 from .time_steps import StepPlan
 
 

@@ -24,7 +24,7 @@ from ...core.system import Load
 from ...fem.matrices.own_matrices import system_from_arrays
 from ...laws.mass import ConsistentMass
 from ...run.march import march
-from ...run.time_steps import LARGEST, HalvedAtImpact, Schedule, TimeSteps
+from ...run.time_steps import LARGEST, ErrorControlled, HalvedAtImpact, Schedule, TimeSteps
 
 
 class CompanionRun:
@@ -59,11 +59,12 @@ class CompanionRun:
         Nothing happens where it has the same ones already.
 
         Raises:
-            InputError: steps that the run itself chooses while it goes (``HalvedAtImpact``).
+            InputError: steps that the run itself chooses while it goes (``HalvedAtImpact``,
+                ``ErrorControlled``).
         """
         if self._bound is not None and self._bound == (scheme, dt):
             return
-        if isinstance(dt, HalvedAtImpact):
+        if isinstance(dt, HalvedAtImpact | ErrorControlled):
             raise InputError(
                 f"{self.name} is computed beside the run and needs its time steps beforehand, but "
                 f"the run has {dt!r}: give dt as a number or a Schedule"
