@@ -54,9 +54,9 @@ class Energies:
 
     Attributes:
         momentum: M v (n,) [N s].
-        elastic: K u (n,) [N].
+        elastic: K u, or p(u) of a body that is not linear (n,) [N].
         kinetic: ½ vᵀMv [J].
-        strain: ½ uᵀKu [J].
+        strain: ½ uᵀKu, or W(u) [J].
     """
 
     momentum: Array
@@ -85,12 +85,13 @@ def compute_energies(
         u: displacement (n,) [m].
         v: velocity (n,) [m/s].
         momentum: M v (n,) [N s], when it is known.
-        elastic: K u (n,) [N], when it is known.
+        elastic: K u, or p(u) (n,) [N], when it is known.
     """
     momentum = system.M @ v if momentum is None else momentum
-    elastic = system.K @ u if elastic is None else elastic
+    elastic = system.internal_force(u) if elastic is None else elastic
     kinetic, strain = _dot_pairs(system, (v, momentum), (u, elastic))
-    return Energies(momentum, elastic, 0.5 * kinetic, 0.5 * strain)
+    stored = 0.5 * strain if system.internal is None else system.internal.energy(u)
+    return Energies(momentum, elastic, 0.5 * kinetic, stored)
 
 
 def _dot_pairs(
@@ -169,6 +170,8 @@ def energy_balance(
         sums=(rubbing, pushing, dragging, damping),
     )
     loading, inner, kinetic, strain, pressing, rubbing, pushing, dragging, damping = works
+    if system.internal is not None:
+        strain = after.strain - before.strain
 
     # The support takes what reactions do on the motion relative to it. What they do on its own
     # motion is input.

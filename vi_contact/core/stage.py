@@ -25,10 +25,11 @@ makes the equation of motion that the ledger reads. Vectors may also be rows (k,
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from .algebra import Array, EffectiveMatrix, Mask
+from .algebra import Array, EffectiveMatrix, Mask, Matrix
 from .problem import ContactProblem
 from .step import Balance, StepProblem, StepResult
 from .system import SemiDiscreteSystem
@@ -71,8 +72,10 @@ class Stage:
         rate_factor: slip rate [m/s] over B_t x - slip0.
         carried: Bᵀr (n,) [N] of reactions of the beginning; None for none.
         weight: of this balance in the mean equation of the step.
-        before: makes the balance at the beginning of the step, which has the weight 1 -
-            ``weight``; None where this balance is the mean one but for its weight.
+        before: makes the balance at the beginning of the step, which has the weight 1 - ``weight``;
+            None where this balance is the mean one but for its weight.
+        old: (share, u0) where the displacement of the stage is a sum share u0 + x over both ends,
+            at each of which the internal force of a body that is not linear is taken.
     """
 
     guess: Array
@@ -90,6 +93,23 @@ class Stage:
     carried: Array | None = None
     weight: float = 1.0
     before: Callable[[], Balance] | None = None
+    old: tuple[float, Array] | None = None
+
+    def find_internal(self, system: SemiDiscreteSystem, d: Array | None = None) -> Array:
+        """Return the internal force (n,) [N] of the balance at an increment; None for zero.
+
+        It is taken at the displacement of the stage or, where ``old`` says so, as a sum over both
+        ends; the two are one for a linear body.
+
+        Args:
+            system: the equations that are marched.
+            d: the increment (n,).
+        """
+        u: Any = self.u.at_guess if d is None else self.u(d)
+        if self.old is None or system.internal is None:
+            return system.internal_force(u)
+        share, u0 = self.old
+        return share * system.internal_force(u0) + system.internal_force(u - share * u0)
 
 
 @dataclass(frozen=True)
@@ -113,16 +133,44 @@ class Answer:
     image: Array
 
 
-def make_matrix(system: SemiDiscreteSystem, stage: Stage) -> EffectiveMatrix:
+def make_matrix(
+    system: SemiDiscreteSystem, stage: Stage, stiffness: Matrix | None = None
+) -> EffectiveMatrix:
     """Return A of the steps with these slopes and this scale.
 
     Args:
         system: the equations that are marched.
         stage: of any step of one size.
+        stiffness: in the place of K, a tangent of the internal force.
     """
     return system.effective(
-        m=stage.scale * stage.a.slope, c=stage.scale * stage.v.slope, k=stage.scale * stage.u.slope
+        m=stage.scale * stage.a.slope,
+        c=stage.scale * stage.v.slope,
+        k=stage.scale * stage.u.slope,
+        stiffness=stiffness,
     )
+
+
+def find_rest(system: SemiDiscreteSystem, stage: Stage, d: Array | None = None) -> Array:
+    """Return what is left of the forces at an increment: b of the step from there, (n,).
+
+    scale (f - carried - M a - C v - p(u)), with p(u) = K u for a linear body.
+
+    Args:
+        system: the equations that are marched.
+        stage: the balance.
+        d: the increment (n,); None for zero.
+    """
+    force = stage.load.copy() if stage.carried is None else stage.load - stage.carried
+    a = stage.a.at_guess if d is None else stage.a(d)
+    if a is not None:  # accelerations are often zero at the guess, by its choice
+        force -= system.M @ a
+    if system.C is not None:
+        v = stage.v.at_guess if d is None else stage.v(d)
+        if v is not None:
+            force -= system.C @ v
+    force -= stage.find_internal(system, d)
+    return force if stage.scale == 1.0 else stage.scale * force
 
 
 def pose(problem: ContactProblem, stage: Stage, A: EffectiveMatrix) -> StepProblem:
@@ -142,10 +190,8 @@ def pose(problem: ContactProblem, stage: Stage, A: EffectiveMatrix) -> StepProbl
         force -= system.M @ stage.a.at_guess
     if system.C is not None and stage.v.at_guess is not None:
         force -= system.C @ stage.v.at_guess
-    internal = None
-    if stage.u.at_guess is not None:
-        internal = system.K @ stage.u.at_guess
-        force -= internal
+    internal = stage.find_internal(system)
+    force -= internal
     if stage.scale != 1.0:
         force *= stage.scale
 

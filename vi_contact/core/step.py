@@ -465,8 +465,8 @@ class Report:
 
     @cached_property
     def elastic(self) -> Array:
-        """Return K u (n,) [N] at the end of the step, made once."""
-        return self.problem.equations.K @ self.new.u
+        """Return K u, or p(u) (n,) [N] at the end of the step, made once."""
+        return self.problem.equations.internal_force(self.new.u)
 
 
 def find_slipping(report: Report) -> Mask:

@@ -20,6 +20,7 @@ from .algebra import Algebra, Array, EffectiveMatrix, Mask, Matrix, freeze
 from .checks import array, function, instance, provides, quote, several
 from .collective import keep_error
 from .errors import InputError
+from .internal import InternalForce, InTurnedUnknowns
 
 
 class Companion(Protocol):
@@ -235,6 +236,8 @@ class SemiDiscreteSystem:
             time steps.
         statics_only: True when nobody said its mass: M then stands for a density of one, by which
             static stages weigh motions against each other, and all else refuses the system.
+        internal: p(u), which takes the place of K u; K is then the reference stiffness. None for a
+            linear body.
     """
 
     algebra: Algebra
@@ -254,6 +257,7 @@ class SemiDiscreteSystem:
     absolute: bool = False
     companions: tuple[Companion, ...] = ()
     statics_only: bool = False
+    internal: InternalForce | None = None
     _cache: dict[str, Any] = field(init=False, default_factory=dict, compare=False, repr=False)
     _loads: dict[float, Array] = field(init=False, default_factory=dict, compare=False, repr=False)
 
@@ -301,8 +305,22 @@ class SemiDiscreteSystem:
         return 0.5 * self.algebra.dot(v, self.M @ v)
 
     def strain_energy(self, u: Array) -> float:
-        """Return ½ uᵀ K u [J]."""
+        """Return ½ uᵀ K u [J], or W(u) where the body is not linear."""
+        if self.internal is not None:
+            return self.internal.energy(u)
         return 0.5 * self.algebra.dot(u, self.K @ u)
+
+    def internal_force(self, u: Array) -> Array:
+        """Return K u (n,) [N], or p(u) where the body is not linear; rows (k, n) of rows."""
+        return self.K @ u if self.internal is None else self.internal.force(u)
+
+    def refuse_nonlinear(self, owner: str, remedy: str) -> None:
+        """Raise InputError where the body is not linear; ``owner`` takes K u for its forces."""
+        if self.internal is not None:
+            raise InputError(
+                f"{owner} knows linear bodies only, and the internal force of this one is not "
+                f"linear: {remedy}"
+            )
 
     def make_once(self, name: str, make: Callable[[], Any], *others: Any) -> Any:
         """Return what ``make`` returned the first time: a factor, or the like.
@@ -363,7 +381,9 @@ class SemiDiscreteSystem:
         """
         return replace(self, **values)
 
-    def effective(self, *, m: float, c: float, k: float) -> EffectiveMatrix:
+    def effective(
+        self, *, m: float, c: float, k: float, stiffness: Matrix | None = None
+    ) -> EffectiveMatrix:
         """Return A = m M + c C + k K for all steps of one size.
 
         Its factor is made when it is first needed.
@@ -372,8 +392,9 @@ class SemiDiscreteSystem:
             m: factor of the mass, [1/s²] where x is a displacement.
             c: factor of the damping, [1/s] there.
             k: factor of the stiffness, 1 there.
+            stiffness: in the place of K, a tangent of the internal force.
         """
-        terms = [(m, self.M), (k, self.K)]
+        terms = [(m, self.M), (k, self.K if stiffness is None else stiffness)]
         if self.C is not None:
             terms.append((c, self.C))
         return EffectiveMatrix(
@@ -435,6 +456,9 @@ class SemiDiscreteSystem:
             base_mass=_map_columns(T.transpose_apply, self.base_mass),
             u0=inverse(self.u0),
             v0=inverse(self.v0),
+            internal=(
+                None if self.internal is None else InTurnedUnknowns(self.internal, T, self.algebra)
+            ),
         )
 
 

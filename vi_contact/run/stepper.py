@@ -14,6 +14,7 @@ is not accepted leaves no trace but its factor, which is kept by the length of t
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -23,10 +24,11 @@ from ..core.collective import agree, call_user, together, together_if_own
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.protocols import Impact
-from ..core.stage import average, complete, make_matrix, pose
+from ..core.stage import Stage, average, complete, make_matrix, pose
 from ..core.state_checks import initial_state
-from ..core.step import Report, Scheme, Solver, State
-from ..solvers.certified import TOLERANCE, CertifiedSolver
+from ..core.step import Report, Scheme, Solver, State, StepProblem
+from ..solvers.certified import TOLERANCE, Certified, CertifiedSolver
+from ..solvers.nonlinear import NonlinearSolver
 from .method import Method, choose_method
 
 FACTORS = 12  # lengths of steps whose factors are kept by a Stepper
@@ -59,12 +61,14 @@ class Stepper:
         state: from which the next attempt starts.
         dt: length of the last accepted step [s]; nan before the first.
         prepared: length of a step [s] -> its effective matrix and solver, one factor each.
+        passes: the like for a body that is not linear.
     """
 
     method: Method
     state: State
     dt: float
     prepared: dict[float, tuple[EffectiveMatrix, CertifiedSolver]]
+    passes: dict[float, NonlinearSolver]
 
     def __init__(
         self,
@@ -123,6 +127,7 @@ class Stepper:
         self.state = state
         self.dt = float("nan")
         self.prepared = {}
+        self.passes = {}
 
     def attempt(self, dt: float) -> Trial:
         """Make a step from the state, which stays where it is. Collective.
@@ -136,9 +141,10 @@ class Stepper:
         """
         number("Stepper.attempt", "dt", dt, positive=True)
         agree(self.method.problem.surface.comm, "Stepper.attempt", {"dt": dt})
-        while len(self.prepared) >= FACTORS and dt not in self.prepared:
-            oldest = next(iter(self.prepared))
-            del self.prepared[oldest]
+        for kept in (self.prepared, self.passes):
+            while len(kept) >= FACTORS and dt not in kept:
+                oldest = next(iter(kept))
+                del kept[oldest]  # type: ignore[attr-defined]
         return Trial(self._attempt(float(dt)), float(dt))
 
     def accept(self, trial: Trial) -> State:
@@ -189,22 +195,12 @@ class Stepper:
         # The scheme says where the balance holds: one inequality A d = b with contact.
         with together_if_own(surface.comm, scheme):
             stage = scheme.stage(problem, state, dt)
-        if dt not in self.prepared:
-            method = self.method
-            A = make_matrix(problem.equations, stage)
-            solver = CertifiedSolver(problem, A, stage.scale, method.solvers, method.tolerance)
-            self.prepared[dt] = (A, solver)
-        A, solver = self.prepared[dt]
-        step = pose(problem, stage, A)
-        if hasattr(scheme, "press"):  # a law of its own at the contact
-            with together_if_own(surface.comm, scheme):
-                stage = scheme.press(problem, state, stage, step, dt)
-            step = pose(problem, stage, A)
-
-        # It is solved with a certificate.
         if surface.watched:
-            surface.refuse_driven(step.t)
-        certified = solver.solve(step)
+            surface.refuse_driven(stage.t)
+        if problem.equations.internal is None:
+            stage, step, certified = self._solve_linear(stage, state, dt)
+        else:
+            step, certified = self._solve_nonlinear(stage, dt)
         answer = complete(stage, step, certified.result, certified.image)
 
         # Displacements and velocities at its end: of the scheme, then of the impact law.
@@ -226,6 +222,48 @@ class Stepper:
             averages=partial(average, problem, stage, step, answer),
             escalated=certified.escalated,
         )
+
+    def _solve_linear(
+        self, stage: Stage, state: State, dt: float
+    ) -> tuple[Stage, StepProblem, Certified]:
+        """Solve a step of a linear body: one pass, with the factor of this dt.
+
+        Args:
+            stage: the balance.
+            state: at the beginning of the step.
+            dt: length of the step [s].
+
+        Returns:
+            The balance, with what a law of the scheme's own adds; the step; its answer.
+        """
+        problem = self.method.problem
+        scheme: Any = self.method.scheme
+        if dt not in self.prepared:
+            method = self.method
+            A = make_matrix(problem.equations, stage)
+            solver = CertifiedSolver(problem, A, stage.scale, method.solvers, method.tolerance)
+            self.prepared[dt] = (A, solver)
+        A, solver = self.prepared[dt]
+        step = pose(problem, stage, A)
+        if hasattr(scheme, "press"):  # a law of its own at the contact
+            with together_if_own(problem.surface.comm, scheme):
+                stage = scheme.press(problem, state, stage, step, dt)
+            step = pose(problem, stage, A)
+        return stage, step, solver.solve(step)
+
+    def _solve_nonlinear(self, stage: Stage, dt: float) -> tuple[StepProblem, Certified]:
+        """Solve a step of a body that is not linear: certified passes about the reference.
+
+        Args:
+            stage: the balance.
+            dt: length of the step [s].
+        """
+        if dt not in self.passes:
+            method = self.method
+            self.passes[dt] = NonlinearSolver(
+                method.problem, stage, method.solvers, method.tolerance
+            )
+        return self.passes[dt].solve(stage)
 
 
 def after_impact(

@@ -92,7 +92,8 @@ def group_runs(runs: Sequence[Together]) -> None:
         plan = run.step_plan
         alone = problem.surface.comm.size > 1 or plan.halvings or run.base >= plan.steps
         beside = problem.system.companions or problem.surface.companions
-        if alone or beside or not getattr(run.method.scheme, "by_rows", False):
+        curved = problem.system.internal is not None
+        if alone or beside or curved or not getattr(run.method.scheme, "by_rows", False):
             continue
         for group in groups:
             first = group[0]

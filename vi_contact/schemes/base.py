@@ -101,6 +101,7 @@ def position_stage(
     carried: Array | None = None,
     weight: float = 1.0,
     before: Callable[[], Balance] | None = None,
+    old: tuple[float, Array] | None = None,
 ) -> Stage:
     """Return the stage of a step in x = u1, with gap and slip at the end of the step.
 
@@ -118,6 +119,8 @@ def position_stage(
         carried: Bᵀr (n,) [N] of reactions of the beginning; None for none.
         weight: of this balance in the mean equation of the step.
         before: makes the balance at the beginning, with the weight 1 - ``weight``; None for none.
+        old: (share, u0) where u is a sum share u0 + u1 over both ends; None where it is no such
+            sum.
 
     Returns:
         The stage: bound is the gap (m,) [m] of the undeformed body at the end, slip is measured
@@ -140,6 +143,7 @@ def position_stage(
         carried=carried,
         weight=weight,
         before=before,
+        old=old,
     )
 
 

@@ -51,7 +51,7 @@ def consistent_acceleration(
         a (n,) [m/s²] and B_nᵀ r_n + B_tᵀ r_t (n,) [N], on the owned unknowns of the rotated basis.
     """
     system = problem.equations
-    force = system.load(state.t) - system.K @ state.u
+    force = system.load(state.t) - system.internal_force(state.u)
     if system.C is not None:
         force -= system.C @ state.v
     if system.massless is None:
@@ -156,6 +156,9 @@ def equilibrate(problem: ContactProblem, state: State) -> State:
     layer = system.massless
     if layer is None:
         return state
+    system.refuse_nonlinear(
+        "the equilibrium of contact nodes without mass", "give the problem mass=ConsistentMass()"
+    )
 
     # The block of K of the massless unknowns, under the load that the others leave on them.
     load = system.load(state.t) - system.K @ np.where(layer, 0.0, state.u)

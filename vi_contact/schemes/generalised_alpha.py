@@ -120,6 +120,7 @@ class AlphaStep(BalanceStep, ABC):
         v = state.v + (1.0 - w.gamma) * dt * a0
         load = system.load_at(state.t + dt)
         carried = None
+        old = None
 
         # The share of the old forces; Newmark's member has none, and saves the products.
         if w.alpha_f != 0.0:
@@ -128,6 +129,7 @@ class AlphaStep(BalanceStep, ABC):
             v = v + ratio * state.v
             load = load + ratio * system.load_at(state.t)
             carried = ratio * state.memory["reaction"]
+            old = (ratio, state.u)
         a = None
         if w.alpha_m != 0.0:
             a = w.alpha_m / (1.0 - w.alpha_f) * a0
@@ -143,6 +145,7 @@ class AlphaStep(BalanceStep, ABC):
             carried=carried,
             weight=self._weigh_end(),
             before=self._look_back(problem, state),
+            old=old,
         )
 
     def _weigh_end(self) -> float:
@@ -201,7 +204,7 @@ def balance_at(problem: ContactProblem, state: State, level: str = "") -> Balanc
     system = problem.equations
     reaction = state.memory[f"reaction{level}"]
     a = state.memory[f"a{level}"]
-    forces = system.M @ a + system.K @ state.u
+    forces = system.M @ a + system.internal_force(state.u)
     if system.C is not None:
         forces += system.C @ state.v
     return Balance(

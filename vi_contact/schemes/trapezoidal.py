@@ -115,6 +115,7 @@ class Trapezoidal:
             load=system.load_at(state.t) + system.load_at(state.t + dt),
             carried=problem.surface.reaction_load(state.r_n, state.u.shape[-1], state.r_t),
             weight=0.5,
+            old=(1.0, state.u),
         )
 
     def finish(

@@ -7,6 +7,7 @@ count the mass that they share with others. ``petsc_system`` takes matrices of s
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,8 +24,9 @@ from ...core.algebra import (
     largest,
     total,
 )
-from ...core.checks import array, integers, on_all, refuse
+from ...core.checks import array, integers, on_all, provides, refuse
 from ...core.errors import InputError
+from ...core.internal import InternalForce
 from ...core.matrix_checks import SYMMETRIC, find_matrix_defects, measure_asymmetry
 from ...core.system import Load, SemiDiscreteSystem
 from ...laws.free_motions import Unheld, floats
@@ -44,6 +46,7 @@ def system_from_arrays(
     load: Load | Sequence[float] | Array | None = None,
     u0: Any = None,
     v0: Any = None,
+    internal: InternalForce | None = None,
 ) -> SemiDiscreteSystem:
     """Make the system M u'' + C u' + K u = f of scipy or dense matrices.
 
@@ -68,6 +71,10 @@ def system_from_arrays(
             motion acts on the unit translation of all displacements.
         u0: (n,) initial displacement [m], zero when None.
         v0: (n,) initial velocity [m/s], zero when None.
+        internal: in the place of K u an internal force that is not linear: an object with
+            ``force(u)`` (n,) [N], ``energy(u)`` [J] and ``tangent(u)``, a matrix (n, n) [N/m], for
+            all n unknowns. K is then the reference stiffness: steps are solved with its factor
+            between tangents, and C is not changed. For march, simulate, Stepper and static stages.
 
     Raises:
         InputError: matrices that are not real, finite, square and of one size, M that is not
@@ -93,7 +100,51 @@ def system_from_arrays(
         "u0": u0,
         "v0": v0,
     }
-    return own_system(OWNER, SerialAlgebra(), SerialAlgebra(symmetric=False), matrices, arguments)
+    algebra = SerialAlgebra()
+    system = own_system(OWNER, algebra, SerialAlgebra(symmetric=False), matrices, arguments)
+    if internal is None:
+        return system
+    remedy = "give an object with force(u), energy(u) and tangent(u)"
+    provides(OWNER, "internal", internal, ("force", "energy", "tangent"), remedy)
+    held = np.asarray(clamped, dtype=np.int64).ravel()
+    rows = np.setdiff1d(np.arange(n), np.where(held < 0, held + n, held))
+    return system.changed(internal=FreeRows(internal, rows, n))
+
+
+@dataclass(frozen=True)
+class FreeRows:
+    """Hold an internal force of the user's on the rows that do not stand still.
+
+    Attributes:
+        internal: of all n unknowns.
+        rows: those that are free.
+        size: n.
+    """
+
+    internal: InternalForce
+    rows: Indices
+    size: int
+
+    def _fill(self, u: Array) -> Array:
+        """Return all unknowns (n,), zero where they stand still."""
+        whole = np.zeros(self.size)
+        whole[self.rows] = u
+        return whole
+
+    def force(self, u: Array) -> Array:
+        """Return p(u) [N] of the free rows."""
+        p = array(OWNER, "internal.force(u)", self.internal.force(self._fill(u)), (self.size,))
+        return np.asarray(p[self.rows], dtype=float)
+
+    def energy(self, u: Array) -> float:
+        """Return W(u) [J]."""
+        return float(self.internal.energy(self._fill(u)))
+
+    def tangent(self, u: Array) -> Matrix:
+        """Return p'(u) [N/m] of the free rows."""
+        tangent: Any = self.internal.tangent(self._fill(u))
+        csr = tangent.csr if isinstance(tangent, SerialMatrix) else sp.csr_matrix(tangent)
+        return SerialMatrix(csr[self.rows][:, self.rows].tocsr())
 
 
 def _copy_matrix(name: str, value: Any) -> SerialMatrix:
