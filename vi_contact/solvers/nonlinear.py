@@ -171,6 +171,11 @@ class NonlinearSolver:
             self.passes += 1
             there = self._judge(stage, whole, here, linear.result)
             worst = there.certificate.worst
+            if not np.isfinite(worst):
+                raise StepFailure(
+                    f"step {whole.k} at t = {whole.t:.6g} s: the internal force is no number after "
+                    f"{count} linear steps, as where a cell is turned inside out: {self._advice}"
+                )
             settled = best is not None and worst > SETTLED * best.certificate.worst
             if best is None or worst < best.certificate.worst:
                 best = there

@@ -259,6 +259,7 @@ def assemble(
             )
         ),
         statics_only=body.statics_only,
+        internal=body.internal,
     )
     body.own(system)
 

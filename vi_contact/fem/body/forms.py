@@ -58,6 +58,7 @@ class ElasticForms:
 
     boundaries: tuple[Dashpots, ...] = ()  # of the same system
     initial: Any = None  # InitialStrains
+    internal: Any = None  # InternalForms of a body that is not linear
     densities = True
     tells_stress = True
     symmetric = True

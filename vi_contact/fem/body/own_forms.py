@@ -12,6 +12,7 @@ from ...laws.materials import Damping, PlaneStrain, Rayleigh, Section
 from .. import compat
 from .form_checks import form_of, is_symmetric, matrix_of, refuse_masses, refuse_stress, takes
 from .forms import ElasticForms, Material
+from .internal_forms import InternalForms, find_reference
 from .space import FemSpace
 
 Bilinear = Callable[[Any, Any], Any]
@@ -41,6 +42,11 @@ class Forms:
             and K, or KelvinVoigt; both add up.
         stress: u -> stress tensor [Pa], (d, d), or in the plane (3, 3) with sigma_zz; von Mises
             stresses and stresses as Functions need it.
+        internal: the internal force p(u)·v of a body that is not linear, a form that is linear in v
+            alone, in the place of the stiffness. Here u is a Function. Steps then go through the
+            nonlinear loop (``solvers.nonlinear``); ``stiffness``, by default the derivative of p at
+            u = 0, is the reference whose factor it takes between tangents.
+        energy: W(u) [J] with p = dW/du, for the energy ledger; given with ``internal``.
 
     Raises:
         InputError: not functions of two arguments (stress: of one); ``assemble`` refuses forms that
@@ -48,14 +54,30 @@ class Forms:
             entries that are not finite.
     """
 
-    stiffness: Bilinear
+    stiffness: Bilinear | None = None
     mass: Bilinear | None = None
     damping: Bilinear | None = None
     stress: Callable[[Any], Any] | None = None
+    internal: Bilinear | None = None
+    energy: Callable[[Any], Any] | None = None
 
     def __post_init__(self) -> None:
-        takes("stiffness", self.stiffness, "u", "v")
-        for name, arguments in (("mass", "uv"), ("damping", "uv"), ("stress", "u")):
+        if (self.internal is None) != (self.energy is None):
+            raise InputError(
+                "Forms: internal and energy belong together: give the internal force (u, v) and "
+                "the stored energy (u), or none of the two"
+            )
+        if self.stiffness is None and self.internal is None:
+            raise InputError("Forms: give stiffness=, the form of K, or internal= and energy=")
+        allowed = {
+            "stiffness": "uv",
+            "mass": "uv",
+            "damping": "uv",
+            "stress": "u",
+            "internal": "uv",
+            "energy": "u",
+        }
+        for name, arguments in allowed.items():
             if getattr(self, name) is not None:
                 takes(name, getattr(self, name), *arguments)
 
@@ -100,6 +122,8 @@ class OwnForms(ElasticForms):
         self.damped = self.law_damps or given.damping is not None
         if given.stress is not None:
             refuse_stress(given.stress, space)
+        if given.internal is not None and given.energy is not None:
+            self.internal = InternalForms(space, given.internal, given.energy)
         self._forms = {
             "K": self._read_form("K"),
             "M": self._read_form("M") or self._weigh_by_density(),
@@ -126,6 +150,9 @@ class OwnForms(ElasticForms):
     def _read_form(self, name: str) -> Any:
         """Return the form that was given for M, C or K, or None. Collective."""
         call = getattr(self._given, ROLES[name])
+        if name == "K" and call is None:
+            assert self._given.internal is not None  # one of the two is there
+            call = find_reference(self.space, self._given.internal)
         if call is None:
             return None
         return form_of(f"Forms: {ROLES[name]}", call, self.space, self.u, self.v)
