@@ -92,6 +92,27 @@ def test_a_block_is_thrown_with_friction(comm: Any) -> None:
         assert abs(history["loss_algorithmic"][-1]) < 0.05 * most
 
 
+def test_a_block_is_pressed_by_a_rising_ground(comm: Any) -> None:
+    """Static stages: the ground rises by a quarter of the height of a flat block that hangs from
+    its top, and the work of the contact forces is the stored energy, by Simpson's rule."""
+    forms = fem.Forms(mass=mass, internal=internal, energy=energy)
+    mesh, tags = fem.build_mesh(BlockMesh(lengths=(2.0, 1.0), divisions=(8, 4)), comm)
+    system = fem.assemble(mesh, forms=forms, section=vc.PlaneStrain(), clamped=tags["top"])
+    ground = vc.HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
+    surface = fem.contact_surface(system, tags["bottom"], obstacle=ground)
+    problem = vc.ContactProblem(system, surface.moving(towards=lambda t: t))
+    times = [0.03 * k for k in range(1, 9)]
+    forces = [0.0]
+    for state in vc.quasi_static(problem, times):
+        forces.append(float(surface.comm.sum(state.r_n.sum())))
+        assert np.all(state.r_n >= 0.0)
+    weights = np.array([1.0, 4.0, 2.0, 4.0, 2.0, 4.0, 2.0, 4.0, 1.0]) * 0.03 / 3.0
+    work = weights @ np.array(forces)
+    assert system.internal is not None
+    u = problem.cartesian(state.u)
+    assert system.internal.energy(u) == pytest.approx(work, rel=2e-3)
+
+
 @pytest.mark.serial
 def test_forms_that_are_none_are_refused() -> None:
     for given, sentence in (

@@ -52,6 +52,11 @@ class Affine:
         change = self.slope * d
         return change if self.at_guess is None else self.at_guess + change
 
+    @property
+    def is_zero(self) -> bool:
+        """Say whether it is zero for every d, as rates are at rest."""
+        return self.at_guess is None and self.slope == 0.0
+
 
 @dataclass(frozen=True)
 class Stage:
@@ -162,26 +167,31 @@ def find_rest(system: SemiDiscreteSystem, stage: Stage, d: Array | None = None) 
         d: the increment (n,); None for zero.
     """
     force = stage.load.copy() if stage.carried is None else stage.load - stage.carried
-    a = stage.a.at_guess if d is None else stage.a(d)
-    if a is not None:  # accelerations are often zero at the guess, by its choice
-        force -= system.M @ a
-    if system.C is not None:
-        v = stage.v.at_guess if d is None else stage.v(d)
-        if v is not None:
-            force -= system.C @ v
+    for matrix, rate in ((system.M, stage.a), (system.C, stage.v)):
+        if matrix is None or rate.is_zero:
+            continue
+        x = rate.at_guess if d is None else rate(d)
+        if x is not None:  # accelerations are often zero at the guess, by its choice
+            force -= matrix @ x
     force -= stage.find_internal(system, d)
     return force if stage.scale == 1.0 else stage.scale * force
 
 
-def pose(problem: ContactProblem, stage: Stage, A: EffectiveMatrix) -> StepProblem:
+def pose(
+    problem: ContactProblem,
+    stage: Stage,
+    A: EffectiveMatrix,
+    system: SemiDiscreteSystem | None = None,
+) -> StepProblem:
     """Return the step for d, with the forces that are left at the guess as its load.
 
     Args:
         problem: the problem that is marched.
         stage: the balance.
         A: the effective matrix of the stage.
+        system: the equations of the step; None: those that are marched.
     """
-    system = problem.equations
+    system = problem.equations if system is None else system
     surface = problem.surface
 
     # Forces at the guess. Accelerations are often zero there, by the choice of the guess.

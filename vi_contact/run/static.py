@@ -25,11 +25,13 @@ from ..core.checks import describe_point, number, quote, real
 from ..core.collective import Parts, agree, together
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
+from ..core.stage import Affine, Stage, complete
 from ..core.state_checks import check_problem_given, check_sizes, initial_state
 from ..core.step import Solver, State, StepProblem, StepResult
 from ..solvers.automatic import Automatic
 from ..solvers.certified import TOLERANCE, CertifiedSolver
 from ..solvers.door import refuse_matrix, refuse_nan
+from ..solvers.nonlinear import NonlinearSolver
 from .method import check_methods
 from .proximal import Proximal
 
@@ -132,12 +134,58 @@ class Equilibria:
             system.K, system.algebra, space=system.space, inertia=(0.0, system.M)
         )
         self._solve: Callable[[StepProblem], StepResult]
+        self._curved: NonlinearSolver | None = None
         refuse_matrix(problem, self._K)
-        if system.floating:
+        if system.internal is not None:
+            self._curved = self._prepare_nonlinear(solver, tolerance)
+        elif system.floating:
             self._solve = Proximal(problem, self._K, solver, tolerance).solve
         else:
             certified = CertifiedSolver(problem, self._K, 1.0, [solver], tolerance, advice=ADVICE)
             self._solve = lambda step: certified.solve(step).result
+
+    def _prepare_nonlinear(self, solver: Solver, tolerance: float) -> NonlinearSolver:
+        """Return what solves stages of a body whose internal force is not linear.
+
+        Args:
+            solver: of linear steps.
+            tolerance: of the certificates, relative.
+
+        Raises:
+            InputError: contact alone holds a body.
+        """
+        problem = self._problem
+        system = problem.static_load
+        if system.floating:
+            raise InputError(
+                "a static stage of a body that is not linear needs supports that hold it: clamp a "
+                "part of it, or march from rest with damping"
+            )
+        first = self._pose_stage(initial_state(problem), 0.0)
+        return NonlinearSolver(problem, first, [solver], tolerance, system=system, advice=ADVICE)
+
+    def _pose_stage(self, old: State, t: float) -> Stage:
+        """Return the balance of forces at rest at a time, in d = u - u of the state before.
+
+        Args:
+            old: the state before.
+            t: the time [s].
+        """
+        problem = self._problem
+        return Stage(
+            guess=old.u,
+            u=Affine(old.u, 1.0),
+            v=Affine(None, 0.0),
+            a=Affine(None, 0.0),
+            load=problem.static_load.load.at_rest(t),
+            scale=1.0,
+            bound=problem.surface.gap(t),
+            slip0=problem.slip_origin(old.u, old.t, t),
+            active=old.active,
+            t=t,
+            k=old.k,
+            rate_factor=0.0,
+        )
 
     def solve(self, old: State, t: float) -> State:
         """Return the equilibrium at a time. Collective.
@@ -150,6 +198,8 @@ class Equilibria:
         # loads, motions and laws of the user's may fail on one rank
         with together(problem.surface.comm):
             problem.surface.refuse_driven(t)
+            if self._curved is not None:
+                return self._solve_nonlinear(self._curved, old, t)
             step = StepProblem(
                 A=self._K,
                 b=problem.static_load.load.at_rest(t),
@@ -167,6 +217,20 @@ class Equilibria:
             result = self._solve(step)
         rest = np.zeros_like(old.u)
         return State(t, old.k, result.x, rest, result.r_n, result.active, r_t=result.r_t)
+
+    def _solve_nonlinear(self, solver: NonlinearSolver, old: State, t: float) -> State:
+        """Return the equilibrium of a body that is not linear at a time.
+
+        Args:
+            solver: of its stages.
+            old: the state before.
+            t: the time [s].
+        """
+        stage = self._pose_stage(old, t)
+        step, certified = solver.solve(stage)
+        answer = complete(stage, step, certified.result, certified.image)
+        rest = np.zeros_like(old.u)
+        return State(t, old.k, answer.x, rest, answer.r_n, answer.active, r_t=answer.r_t)
 
 
 def quasi_static(

@@ -16,8 +16,9 @@ b - A d.
 A is m M + c C + k K with the reference stiffness K, whose factor is made once. Passes with it
 converge linearly and are accelerated (D. G. Anderson, 1965, Iterative procedures for nonlinear
 integral equations). Where the passes that are still expected would cost more than a new factor,
-counted by unknowns and never by a clock, K is replaced by the tangent p'(u). A pass with a tangent
-that does not help is thrown away and done again with the reference.
+counted by unknowns and never by a clock, and where a pass does not help, K is replaced by the
+tangent p'(u). Of a pass with a tangent that does not help only a part of the way is gone, as far as
+the certificate's own residual becomes smaller.
 """
 
 import logging
@@ -29,10 +30,11 @@ import numpy as np
 
 from ..core.algebra import Array, EffectiveMatrix, Mask
 from ..core.certificate import Certificate
-from ..core.errors import StepFailure
+from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
 from ..core.stage import Stage, find_rest, make_matrix, pose
 from ..core.step import Solver, StepProblem, StepResult
+from ..core.system import SemiDiscreteSystem
 from ..core.verify import kkt_residual
 from .certified import ADVICE, NEAR, Certified, CertifiedSolver
 
@@ -40,6 +42,8 @@ log = logging.getLogger(__name__)
 
 MOST = 60  # passes of a step
 DEPTH = 5  # passes that the acceleration remembers
+HALVINGS = 10  # of a pass that does not help
+ARMIJO = 1e-2  # of the part of a pass: the part of the residual that it must take away
 SETTLED = 0.5  # of the residual before: a pass that gains less brings no more digits
 # Passes with the reference that a new tangent with its factor costs, over the root of the unknowns
 # over their logarithm in the plane, and over their power 2/3 in space (measured: 15 and 45 passes
@@ -123,6 +127,7 @@ class NonlinearSolver:
         solvers: Sequence[Solver],
         tolerance: float,
         *,
+        system: SemiDiscreteSystem | None = None,
         advice: str = ADVICE,
     ) -> None:
         """Prepare the reference. Collective.
@@ -132,15 +137,17 @@ class NonlinearSolver:
             stage: of any step of this length.
             solvers: of linear steps, and the methods to escalate to.
             tolerance: the largest residual of a certificate.
+            system: the equations of the steps; None: those that are marched.
             advice: end of the sentence that refuses a step.
         """
         self._problem = problem
+        self._system = problem.equations if system is None else system
         self._solvers = solvers
         self._tolerance = tolerance
         self._advice = advice
         self.tangents = 0
         self.passes = 0
-        self.A = make_matrix(problem.equations, stage)
+        self.A = make_matrix(self._system, stage)
         self._reference = self._prepare(stage, self.A)
         self._cost = _count_passes_of_a_factor(problem)
 
@@ -156,7 +163,7 @@ class NonlinearSolver:
         Raises:
             StepFailure: no pass came below the tolerance, or a linear step has no answer.
         """
-        whole = pose(self._problem, stage, self.A)
+        whole = pose(self._problem, stage, self.A, self._system)
         aim = NEAR * self._tolerance
         here = self._start(whole)
         best: Pass | None = None
@@ -164,18 +171,26 @@ class NonlinearSolver:
         escalated = False
         solver = self._reference
         A = self.A
+        may_be_tangent = True
         accelerate = self._begin_acceleration()
         for count in range(1, MOST + 1):
-            linear = solver.solve(self._pose_about(whole, here, A))
+            try:
+                linear = solver.solve(self._pose_about(whole, here, A))
+            except (InputError, StepFailure) as refusal:
+                # A tangent that is not positive, as that of a body about to buckle, has no factor
+                # or no answer: the reference goes on from here, without tangents.
+                if solver is self._reference:
+                    raise
+                log.debug("step %d: a tangent is of no use (%s)", whole.k, refusal)
+                solver = self._reference
+                A = self.A
+                may_be_tangent = False
+                accelerate = self._begin_acceleration()
+                continue
             escalated = escalated or linear.escalated
             self.passes += 1
             there = self._judge(stage, whole, here, linear.result)
             worst = there.certificate.worst
-            if not np.isfinite(worst):
-                raise StepFailure(
-                    f"step {whole.k} at t = {whole.t:.6g} s: the internal force is no number after "
-                    f"{count} linear steps, as where a cell is turned inside out: {self._advice}"
-                )
             settled = best is not None and worst > SETTLED * best.certificate.worst
             if best is None or worst < best.certificate.worst:
                 best = there
@@ -183,24 +198,62 @@ class NonlinearSolver:
             if worst <= aim or (certified and settled):
                 return whole, self._finish(whole, best, count, escalated)
 
-            # A tangent that does not help is let go; where it stood, the reference goes on.
-            if worst > before and solver is not self._reference:
-                solver = self._reference
-                A = self.A
-                before = np.inf
-                accelerate = self._begin_acceleration()
-                continue
-            here = self._move(stage, here, there, accelerate, whole)
-            if self._wants_tangent(worst, before, aim):
+            # A pass that does not help: the reference is too soft or too stiff, and a tangent takes
+            # its place; with a tangent, only a part of the way is gone.
+            helps = worst < before
+            if helps:
+                here = self._move(stage, here, there, accelerate)
+            elif solver is not self._reference or not np.isfinite(worst):
+                there = self._shorten(stage, whole, here, linear.result, before)
+                worst = there.certificate.worst
+                here = there
+            wanted = not helps or self._wants_tangent(worst, before, aim)
+            if wanted and may_be_tangent:
                 A = self._make_tangent(stage, here)
                 solver = self._prepare(stage, A)
                 accelerate = self._begin_acceleration()
-            before = worst
+            before = worst if helps or here is there else before
         reached = "" if best is None else f" ({best.certificate})"
         raise StepFailure(
             f"step {whole.k} at t = {whole.t:.6g} s of a body that is not linear did not come "
             f"below the certificate tolerance {self._tolerance:g} in {MOST} linear steps{reached}: "
             f"{self._advice}"
+        )
+
+    def _shorten(
+        self, stage: Stage, whole: StepProblem, here: Pass, result: StepResult, before: float
+    ) -> Pass:
+        """Return the longest part of a pass that makes the residual of the certificate smaller.
+
+        Displacements and reactions go the same part of their way. Collective.
+
+        Args:
+            stage: the balance.
+            whole: the step at the guess.
+            here: where the pass started.
+            result: the answer of its linear step.
+            before: the residual where it started; infinite where nothing is known of it.
+
+        Raises:
+            StepFailure: no part helps.
+        """
+        old = here.result
+        for part in 0.5 ** np.arange(1, HALVINGS + 1):
+            r_t = result.r_t
+            if r_t is not None:
+                r_t = part * r_t if old.r_t is None else old.r_t + part * (r_t - old.r_t)
+            shorter = replace(
+                result,
+                x=part * result.x,
+                r_n=old.r_n + part * (result.r_n - old.r_n),
+                r_t=r_t,
+            )
+            there = self._judge(stage, whole, here, shorter)
+            if there.certificate.worst < (1.0 - ARMIJO * part) * before:
+                return there
+        raise StepFailure(
+            f"step {whole.k} at t = {whole.t:.6g} s of a body that is not linear: no part of a "
+            f"linear step makes the residual {before:.1e} smaller: {self._advice}"
         )
 
     def _begin_acceleration(self) -> Anderson:
@@ -256,13 +309,11 @@ class NonlinearSolver:
             slip0 = whole.slip0 - surface.tangential_values(here.d)
             sticks = surface.tangential_values(result.x) == slip0
             surface.put_tangential(d, whole.slip0, sticks)
-        rest = find_rest(self._problem.equations, stage, d)
+        rest = find_rest(self._system, stage, d)
         answer = replace(result, x=d)
         return Pass(d, rest, answer, kkt_residual(whole, answer, whole.b - rest))
 
-    def _move(
-        self, stage: Stage, here: Pass, there: Pass, accelerate: Anderson, whole: StepProblem
-    ) -> Pass:
+    def _move(self, stage: Stage, here: Pass, there: Pass, accelerate: Anderson) -> Pass:
         """Return from where the next pass starts. Collective.
 
         Args:
@@ -270,12 +321,11 @@ class NonlinearSolver:
             here: where this pass started.
             there: where it led.
             accelerate: what the passes before say.
-            whole: the step at the guess.
         """
         d = accelerate.extrapolate(here.d, there.d - here.d)
         if len(accelerate.points) == 1:
             return there
-        return replace(there, d=d, rest=find_rest(self._problem.equations, stage, d))
+        return replace(there, d=d, rest=find_rest(self._system, stage, d))
 
     def _wants_tangent(self, worst: float, before: float, aim: float) -> bool:
         """Tell whether the passes that are still expected cost more than a new factor.
@@ -295,7 +345,7 @@ class NonlinearSolver:
 
     def _make_tangent(self, stage: Stage, here: Pass) -> EffectiveMatrix:
         """Return A with the tangent at an increment."""
-        system = self._problem.equations
+        system = self._system
         if system.internal is None:
             return self.A
         self.tangents += 1
