@@ -17,7 +17,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .algebra import Algebra, Array, EffectiveMatrix, Mask, Matrix
+from .algebra import Algebra, Array, EffectiveMatrix, Mask, Matrix, expect_products
 from .checks import array, function, instance, provides, quote, several
 from .collective import keep_error
 from .errors import InputError
@@ -270,6 +270,7 @@ class SemiDiscreteSystem:
         names = ("combine", "factor", "dot", "comm")
         remedy = "give SerialAlgebra() or PetscAlgebra(comm)"
         provides(owner, "algebra", self.algebra, names, remedy)
+        expect_products(self.M, self.C, self.K)
         instance(owner, "load", self.load, Load, "give Load(constant, …)")
         remedy = "give a space, what unknowns mean"
         provides(owner, "space", self.space, ("dimension", "ids"), remedy)
@@ -449,8 +450,11 @@ class SemiDiscreteSystem:
                 total += c * self.product("C", x)
             return total
 
+        A = self.algebra.combine(terms)
+        if not shares:
+            expect_products(A)
         return EffectiveMatrix(
-            self.algebra.combine(terms),
+            A,
             self.algebra,
             space=self.space,
             inertia=(m, self.M),
