@@ -17,6 +17,9 @@ static problem of Signorini on triangles without assembly. It stands beside the 
 condense: PETSc's factor, a substitution for every contact unknown, and a second one for the
 reactions.
 
+Products with M, C and K are counted in a step, and timed in turn with products of the same matrices
+as AIJ.
+
 Seconds are processor time of one thread. Medians and means are over steps with contact. Any size
 can be asked for, in unknowns. Sizes in space and in statics that teach nothing or take minutes are
 left out.
@@ -31,9 +34,11 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[name] = "1"
@@ -51,7 +56,11 @@ from vi_contact import fem  # noqa: E402
 from vi_contact.core.algebra import EffectiveMatrix, SerialComm  # noqa: E402
 from vi_contact.core.stage import complete, make_matrix, pose  # noqa: E402
 from vi_contact.core.state_checks import initial_state  # noqa: E402
-from vi_contact.fem.matrices.petsc_algebra import PREFIX, PetscFactor  # noqa: E402
+from vi_contact.fem.matrices.petsc_algebra import (  # noqa: E402
+    PREFIX,
+    PetscFactor,
+    PetscMatrix,
+)
 from vi_contact.kernels import contact_last  # noqa: E402
 from vi_contact.kernels.compiler import load_cholmod, locate_arrays  # noqa: E402
 from vi_contact.meshes.block import BlockMesh  # noqa: E402
@@ -74,6 +83,7 @@ PETSC_IN_SPACE = (
     3e4  # unknowns beyond which PETSc's own factorisation in three dimensions takes minutes
 )
 SHORT_STEPS = 5e3  # unknowns below which ten times as many steps are timed
+COUNTED = 20  # steps in which products are counted
 RUBBING = vc.Coulomb(0.4)
 Problem = tuple[vc.ContactProblem, float, Any]  # with its dt and the state it starts from
 
@@ -328,6 +338,7 @@ def measure(name: str, given: Problem, factors: Factors, count: int) -> dict[str
     scale = [report.step.scale for report in steps][-1]
     setup = set_up(problem, dt, scale)
     own = factors.setup.get("PETSc")
+    matrices = marched(problem.equations)
     median = np.median(steps.seconds)
     mean = np.mean(steps.seconds)
     plain = steps.plain
@@ -348,7 +359,56 @@ def measure(name: str, given: Problem, factors: Factors, count: int) -> dict[str
         "linear": linear.fastest(),
         "certificate": steps.worst,
         "closed": float(np.mean(steps.active)),
+        "product_format": {name: one.product_format for name, one in matrices.items()},
+        "products_per_step": count_products(matrices, steps.loop) / COUNTED,
+        "product_over_aij": compare_products(matrices),
     }
+
+
+def marched(system: vc.SemiDiscreteSystem) -> dict[str, PetscMatrix]:
+    """Return the matrices of a system by name."""
+    matrices = {name: getattr(system, name) for name in ("M", "C", "K")}
+    return {name: matrix for name, matrix in matrices.items() if matrix is not None}
+
+
+class Counting:
+    """Count the products by a PETSc matrix, and make them."""
+
+    def __init__(self, mat: Any) -> None:
+        self.mat = mat
+        self.count = 0
+
+    def mult(self, x: Any, y: Any) -> None:
+        """Write A x to y."""
+        self.count += 1
+        self.mat.mult(x, y)
+
+
+def count_products(matrices: dict[str, PetscMatrix], loop: Iterator[Any]) -> int:
+    """Return how many products with the matrices the next steps make; these are not timed."""
+    with ExitStack() as stack:
+        counters = []
+        for matrix in matrices.values():
+            counter = Counting(matrix._multiplied)
+            stack.enter_context(patch.object(matrix, "_multiplied", counter))
+            counters.append(counter)
+        for _ in range(COUNTED):
+            next(loop)
+    return sum(counter.count for counter in counters)
+
+
+def compare_products(matrices: dict[str, PetscMatrix]) -> float:
+    """Return what a product with each matrix costs, over products of the same as AIJ, in turn."""
+    used = list(matrices.values())
+    # ``mat`` is AIJ, and nobody has told this one that many products follow
+    plain = [PetscMatrix(matrix.mat) for matrix in used]
+    x = np.random.default_rng(1).normal(size=used[0].rows)
+    seconds: dict[str, list[float]] = {"used": [], "plain": []}
+    for _ in range(2 * COUNTED):
+        for name, ones in (("used", used), ("plain", plain)):
+            spent, _ = timed(lambda ones=ones: [matrix @ x for matrix in ones])
+            seconds[name].append(spent)
+    return float(np.median(seconds["used"]) / np.median(seconds["plain"]))
 
 
 class Whole(EffectiveMatrix):
@@ -413,6 +473,9 @@ def square(size: float) -> dict[str, Any]:
         "seconds_before": before,
         "over_before": now / before,
         "closed": float(one.active.sum()),
+        "product_format": {"K": system.K.product_format},
+        "products_per_step": None,
+        "product_over_aij": compare_products({"K": system.K}),
         "difference": float(np.abs(one.u - other.u).max() / np.abs(other.u).max()),
     }
 
@@ -440,6 +503,8 @@ COLUMNS = (  # title, width, format, key
     ("set-up s", 8, ".3f", "setup_seconds"),
     ("/PETSc", 6, ".2f", "setup_over_factorisation"),
     ("/CHOLMOD", 8, ".2f", "setup_over_cholmod"),
+    ("products", 8, ".1f", "products_per_step"),
+    ("/AIJ", 5, ".2f", "product_over_aij"),
     ("before", 6, ".2f", "over_before"),
     ("certificate", 11, ".0e", "certificate"),
 )

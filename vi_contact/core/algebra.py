@@ -106,6 +106,14 @@ class Matrix(Protocol):
         """Return the diagonal entries of the owned rows."""
 
 
+def expect_products(*matrices: Matrix | None) -> None:
+    """Tell matrices that many products follow, so that those of PETSc choose their format."""
+    for matrix in matrices:
+        tell = getattr(matrix, "expect_products", None)
+        if tell is not None:
+            tell()
+
+
 class Factor(Protocol):
     """Hold a factorised symmetric matrix; ``solve`` is one forward and back substitution."""
 

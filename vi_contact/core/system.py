@@ -16,7 +16,15 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .algebra import Algebra, Array, EffectiveMatrix, Mask, Matrix, freeze
+from .algebra import (
+    Algebra,
+    Array,
+    EffectiveMatrix,
+    Mask,
+    Matrix,
+    expect_products,
+    freeze,
+)
 from .checks import array, function, instance, provides, quote, several
 from .collective import keep_error
 from .errors import InputError
@@ -269,6 +277,7 @@ class SemiDiscreteSystem:
         names = ("combine", "factor", "dot", "comm")
         remedy = "give SerialAlgebra() or PetscAlgebra(comm)"
         provides(owner, "algebra", self.algebra, names, remedy)
+        expect_products(self.M, self.C, self.K)
         instance(owner, "load", self.load, Load, "give Load(constant, …)")
         remedy = "give a space, what unknowns mean"
         provides(owner, "space", self.space, ("dimension", "ids"), remedy)
@@ -397,9 +406,9 @@ class SemiDiscreteSystem:
         terms = [(m, self.M), (k, self.K if stiffness is None else stiffness)]
         if self.C is not None:
             terms.append((c, self.C))
-        return EffectiveMatrix(
-            self.algebra.combine(terms), self.algebra, space=self.space, inertia=(m, self.M)
-        )
+        A = self.algebra.combine(terms)
+        expect_products(A)
+        return EffectiveMatrix(A, self.algebra, space=self.space, inertia=(m, self.M))
 
     def with_load(self, *terms: tuple[Array, Callable[[float], float]]) -> "SemiDiscreteSystem":
         """Return the same system with separable loads vector * history(t) added.

@@ -32,15 +32,6 @@ class Half(PetscMatrix):
         whole.setBlockSize(1)
         return whole
 
-    @property
-    def bytes(self) -> float:
-        """Return the bytes of the half that is stored.
-
-        Of the 12 bytes of an entry and its column, 8 are the entry, and a block of b² entries
-        shares the 4 of one column: (8 + 4/b²)/12 = (2 + b⁻²)/3 (with 64-bit columns about so).
-        """
-        return super().bytes * (2.0 + self.stored.getBlockSize() ** -2) / 3.0
-
     def transpose_apply(self, x: Array) -> Array:
         """Return A x, which is Aᵀ x."""
         return self @ x

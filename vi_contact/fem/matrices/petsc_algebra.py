@@ -21,6 +21,7 @@ from ..mesh.communicators import MpiComm, give_back
 from .copied_factor import contact_last, make_product_of_rows
 from .direct import by_mumps, failure, finite, ordering, own_serves
 from .petsc_rows import aij_of, rows_of
+from .product_formats import copy_for_products
 
 PREFIX = "vi_contact_factor_"
 OWN_FACTOR = {"ksp_type": "preonly", "pc_factor_mat_solver_type": "petsc"}
@@ -55,11 +56,13 @@ class PetscMatrix:
     """Hold an AIJ matrix behind the ``Matrix`` protocol.
 
     ``stored`` is the PETSc object, ``mat`` too unless it is stored otherwise: then it is made anew
-    (``fem.matrices.half``).
+    (``fem.matrices.half``). Products may be made by a copy in another format
+    (``fem.matrices.product_formats``).
     """
 
     def __init__(self, mat: Any) -> None:
         self.stored = mat
+        self._expects_products = False
         rows, columns = mat.getLocalSize()
         self._in, self._x = _make_vector(mat.comm, columns, 1)
         self._out, self._y = _make_vector(mat.comm, rows, 0)
@@ -76,14 +79,41 @@ class PetscMatrix:
 
     @property
     def bytes(self) -> float:
-        """Return the bytes of the entries of this rank and their columns."""
-        return _ENTRY * float(self.stored.getInfo(PETSc.Mat.InfoType.LOCAL)["nz_allocated"])
+        """Return the bytes of the entries of this rank and their columns, the copy's too."""
+        size = _count_bytes(self.stored)
+        copy = self.__dict__.get("_multiplied", self.stored)
+        return size if copy is self.stored else size + _count_bytes(copy)
+
+    def expect_products(self) -> None:
+        """Say that many products follow, for which the next one may make a copy of the matrix."""
+        if not self._expects_products:
+            self._expects_products = True
+            self.forget_copy()
+
+    def forget_copy(self) -> None:
+        """Forget the copy for products, which the next product makes again."""
+        self.__dict__.pop("_multiplied", None)
+
+    @property
+    def product_format(self) -> str:
+        """Return PETSc's name of the type that products read: aij, baij, sbaij or sell. Collective.
+
+        The first call may make the copy.
+        """
+        return str(self._multiplied.getType()).removeprefix("seq").removeprefix("mpi")
+
+    @cached_property
+    def _multiplied(self) -> Any:
+        """Return the PETSc matrix by which products are made."""
+        if not self._expects_products:
+            return self.stored
+        return copy_for_products(self.stored, MpiComm(self.stored.comm.tompi4py()))
 
     def __matmul__(self, x: Array) -> Array:
         if x.ndim == 2:
             return self._rows_by(x)
         self._in[:] = x
-        self.stored.mult(self._x, self._y)
+        self._multiplied.mult(self._x, self._y)
         return self._out.copy()
 
     @cached_property
@@ -99,6 +129,16 @@ class PetscMatrix:
     def diagonal(self) -> Array:
         """Return the diagonal entries of the owned rows."""
         return np.array(self.stored.getDiagonal().array_r)
+
+
+def _count_bytes(mat: Any) -> float:
+    """Return the bytes of the entries of this rank of a PETSc matrix and of their columns.
+
+    In blocks of b² entries, these share one column.
+    """
+    entries = float(mat.getInfo(PETSc.Mat.InfoType.LOCAL)["nz_allocated"])
+    width = mat.getBlockSize() if mat.getType().endswith("baij") else 1
+    return entries * (8.0 + (_ENTRY - 8.0) / width**2)
 
 
 class PetscFactor:
@@ -286,8 +326,10 @@ class PetscAlgebra:
         return PetscMatrix(mat)
 
     def congruence(self, T: Matrix, K: Matrix) -> Matrix:
-        """Return Tᵀ K T."""
-        return self.store(triple_product(as_petsc(K).mat, as_petsc(T).mat))
+        """Return Tᵀ K T. K is hardly multiplied from now on: its copy for products goes."""
+        turned = self.store(triple_product(as_petsc(K).mat, as_petsc(T).mat))
+        as_petsc(K).forget_copy()
+        return turned
 
     def local(self, rows: Indices, columns: Indices, values: Array, n: int) -> Matrix:
         """Return the matrix of entries between the n unknowns of one rank.
