@@ -16,6 +16,10 @@ from .forms import depends_on, differentiate, make_error, split_form
 from .jacobian import FreeJacobian
 from .rounding import OFF, measure_field
 
+# Gauss's rule on (0, 1): places and weights
+_places, _weights = np.polynomial.legendre.leggauss(4)
+GAUSS = (0.5 * (1.0 + _places), 0.5 * _weights)
+
 
 class Equations:
     """Evaluate F, its Jacobian J and the energy at the present u, for one answer after another.
@@ -82,6 +86,7 @@ class Equations:
         self.constant = not depends_on(expand_derivatives(J), u)
         self._jacobian: FreeJacobian | None = None
         self.version = 0
+        self.measure_work_from(None)
         self.start()
 
     def start(self) -> None:
@@ -172,9 +177,46 @@ class Equations:
         return np.array(self._residual.x.array[: self.owned][self.free])
 
     def evaluate_energy(self) -> float:
-        """Return the energy at u, infinity where it is no number. Collective."""
-        energy = total(self.comm, compat.assemble_scalar(self._energy))
+        """Return the energy at u, infinity where it is no number. Collective.
+
+        Where F alone is given, it is the work of F since ``measure_work_from``.
+        """
+        energy = self._integrate_work()
+        if self._energy is not None:
+            energy = total(self.comm, compat.assemble_scalar(self._energy))
         return energy if np.isfinite(energy) else np.inf
+
+    def measure_work_from(self, x: Array | None, energy: float = 0.0) -> None:
+        """Measure the work of F from here on, where F alone is given.
+
+        Args:
+            x: (n,) free unknowns; None for a work of zero wherever F is a number.
+            energy: the energy there.
+        """
+        self._origin = x
+        self._energy_at_origin = energy
+
+    def _integrate_work(self) -> float:
+        """Return the energy at u by the work of F on the straight way to it. Collective.
+
+            E(x) = E(x_0) + ∫_0^1 F(x_0 + s (x - x_0))·(x - x_0) ds
+
+        It is a function of u where the Jacobian of F is symmetric, and zero where an energy is
+        given. By Gauss's rule, whose points are inside: a way along which F is no number is too
+        long.
+        """
+        if self._energy is not None:
+            return 0.0
+        x = self.x
+        if self._origin is None:
+            return 0.0 * total(self.comm, np.sum(self.assemble_residual()))
+        way = x - self._origin
+        energy = self._energy_at_origin
+        for place, weight in zip(*GAUSS, strict=True):
+            self.put(self._origin + place * way)
+            energy += weight * self.dot(self.assemble_residual(), way)
+        self.put(x)
+        return energy
 
     def linearise(self, left: float) -> tuple[PetscMatrix, Array]:
         """Return J at u on the free unknowns, and what F of these will gain (n,). Collective.

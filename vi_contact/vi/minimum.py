@@ -6,6 +6,8 @@ energy falls as the model says and shrinks where it does not, also where the ene
 number. J need not be positive definite: along a direction of negative curvature the step goes to
 the edge of the region. Reference: C.-J. Lin and J. J. Moré, 1999, Newton's method for large
 bound-constrained optimization problems (TRON).
+
+Where F alone is given and its Jacobian is symmetric, the work of F takes the place of the energy.
 """
 
 import numpy as np
@@ -17,6 +19,7 @@ from .judged import Judged
 from .model import Model
 from .newton import Progress, begin
 
+METHOD = "trust region"
 ACCEPTED = 1e-4  # the part of the promised decrease that a step must bring
 POOR = 0.25  # the part of it below which the radius shrinks
 GOOD = 0.75  # the part of it above which the radius grows
@@ -58,7 +61,8 @@ def minimise(
         Where it ends: at a point whose certificate is below the tolerance, and where no direction
         of negative curvature is found; or with a failure.
     """
-    progress = Progress(begin(equations, lower, upper), method="trust region")
+    equations.measure_work_from(None)
+    progress = Progress(begin(equations, lower, upper), method=METHOD)
     while progress.best.left and not progress.failure:
         carry_conditions(progress, layers)
     if not progress.failure:
@@ -107,6 +111,7 @@ def descend(progress: Progress, tolerance: float, limit: int, layers: OptionLaye
         layers: options of the preconditioner.
     """
     point = progress.best
+    point.equations.measure_work_from(point.x)
     energy = point.equations.evaluate_energy()
     if point.broken or not np.isfinite(energy):
         progress.failure = NOT_A_NUMBER
@@ -156,6 +161,7 @@ def _follow(
                 model.close()
                 point = next_point
                 energy = trial
+                equations.measure_work_from(point.x, energy)
                 model = Model(point, layers)
                 progress.advance(point)
                 share = 1.0

@@ -7,7 +7,8 @@
   whose linear problems are those of the volume route (``linear_steps``). It makes the natural
   residual u - mid(lower, u - F/J_ii, upper) smaller in each step; a linear problem takes one step.
 - an energy, whose derivative F is: a descent with a trust region (``minimum``), which also leaves
-  maxima and saddles.
+  maxima and saddles. It is taken for a form too, where Newton's method fails as the Jacobian is
+  symmetric and not positive.
 
 What either has found is judged by one certificate (``judged``).
 """
@@ -35,7 +36,7 @@ from .equations import Equations
 from .forms import make_error
 from .judged import Judged
 from .linear_steps import LinearSteps, is_symmetric
-from .minimum import minimise
+from .minimum import METHOD, minimise
 from .model import Model
 from .newton import Progress, solve_in_parts
 
@@ -186,9 +187,8 @@ class Problem:
             StepFailure: the certificate stays above the tolerance; u keeps the best values so far.
         """
         start = time.process_time()
-        limit = DESCENT_STEPS if self._by_energy else NEWTON_STEPS
         if iterations is not None:
-            limit = whole("vi.solve", "iterations", iterations, least=1)
+            whole("vi.solve", "iterations", iterations, least=1)
         equations = self._equations
         choices = {
             "lower": take_common_part(lower),
@@ -204,7 +204,7 @@ class Problem:
         )
         ready = time.process_time()
         try:
-            progress, doubt = self._find(low, high, limit)
+            progress, doubt = self._find(low, high, iterations)
         except InputError:
             self._steps.close()  # so that options which are refused now are refused again
             raise
@@ -219,21 +219,47 @@ class Problem:
         self._steps.close()
         self._equations.close()
 
-    def _find(self, low: Array, high: Array, limit: int) -> tuple[Progress, bool]:
+    def _find(self, low: Array, high: Array, iterations: int | None) -> tuple[Progress, bool]:
         """Return where the method ends, and whether F has negative curvature there. Collective.
 
         Args:
             low: (n,) bounds of the free unknowns from below.
             high: (n,) from above.
-            limit: number of steps, at most.
+            iterations: steps, at most; None for as many as are usual.
         """
         # Newton's method for a form, a descent for an energy.
         if self._by_energy:
-            return minimise(self._equations, low, high, self._tolerance, limit, self._layers), False
+            return self._descend(low, high, iterations), False
+        limit = NEWTON_STEPS if iterations is None else iterations
         progress = solve_in_parts(self._equations, low, high, self._steps, limit)
         # A Jacobian with negative curvature explains a failure, and casts doubt on an answer.
         is_asked = bool(progress.failure) or progress.doubted
-        return progress, is_asked and curves_down(progress, self._layers)
+        is_hill = is_asked and curves_down(progress, self._layers)
+        if not (progress.failure and is_hill):
+            return progress, is_hill
+
+        # The form is the derivative of some energy: go down, and count the steps so far too.
+        self._equations.put_back()
+        descent = self._descend(low, high, iterations)
+        if descent.failure:
+            return progress, is_hill
+        descent.steps += progress.steps
+        descent.inner += progress.inner
+        return descent, False
+
+    def _descend(self, low: Array, high: Array, iterations: int | None) -> Progress:
+        """Return where the descent ends. Collective.
+
+        Args:
+            low: (n,) bounds of the free unknowns from below.
+            high: (n,) from above.
+            iterations: steps, at most; None for as many as are usual.
+        """
+        limit = DESCENT_STEPS if iterations is None else iterations
+        equations = self._equations
+        progress = minimise(equations, low, high, self._tolerance, limit, self._layers)
+        give_back(equations.comm.mpi)  # the models on the way have made PETSc objects
+        return progress
 
     def _explain(self, progress: Progress, is_hill: bool) -> str:
         """Return why the method ended. Collective.
@@ -245,7 +271,7 @@ class Problem:
         Raises:
             StepFailure: it ended without an answer.
         """
-        steps = "steps downhill" if self._by_energy else "Newton steps"
+        steps = "steps downhill" if progress.method == METHOD else "Newton steps"
         worst = progress.best.certificate.worst
         reason = f"the certificate is {worst:.1e} after {progress.steps} {steps}"
         if progress.failure:
@@ -256,7 +282,7 @@ class Problem:
             reason += f", {HILL}"
             if self._equations.comm.rank == 0:
                 log.warning("vi.solve: %s", HILL)
-        if self._by_energy:
+        if progress.method == METHOD:
             reason += ", at a local minimum: no direction of negative curvature is found"
         return reason
 
