@@ -53,7 +53,7 @@ def solve(
             gradients, e.g. {"pc_type": "hypre"}.
         prefix: of these options on the command line.
         tolerance: the largest residual of the certificate.
-        iterations: steps, at most; None: 50, and 500 of an energy.
+        iterations: steps, at most; None: 50, and 1000 of an energy.
 
     Returns:
         The answer, with multipliers and certificate.

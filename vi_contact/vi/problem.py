@@ -52,7 +52,7 @@ HILL = (
     "is no minimum of it, and energy= in the place of F finds one"
 )
 NEWTON_STEPS = 50  # of a form, at most, unless the user gives a number
-DESCENT_STEPS = 500  # of an energy
+DESCENT_STEPS = 1000  # of an energy
 
 
 @dataclass(frozen=True)
@@ -177,7 +177,7 @@ class Problem:
                 one for each component; a function that takes points x (3, n) and returns values
                 (n,) or (components, n); an expression of UFL; or None.
             upper: bounds from above, as ``lower``.
-            iterations: steps, at most; None: 50, and 500 of an energy.
+            iterations: steps, at most; None: 50, and 1000 of an energy.
 
         Returns:
             The answer, with multipliers and certificate.
