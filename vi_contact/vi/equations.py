@@ -209,7 +209,8 @@ class Equations:
             return 0.0
         x = self.x
         if self._origin is None:
-            return 0.0 * total(self.comm, np.sum(self.assemble_residual()))
+            is_finite = self.all(bool(np.all(np.isfinite(self.assemble_residual()))))
+            return 0.0 if is_finite else np.inf
         way = x - self._origin
         energy = self._energy_at_origin
         for place, weight in zip(*GAUSS, strict=True):

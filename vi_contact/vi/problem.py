@@ -7,8 +7,8 @@
   whose linear problems are those of the volume route (``linear_steps``). It makes the natural
   residual u - mid(lower, u - F/J_ii, upper) smaller in each step; a linear problem takes one step.
 - an energy, whose derivative F is: a descent with a trust region (``minimum``), which also leaves
-  maxima and saddles. It is taken for a form too, where Newton's method fails as the Jacobian is
-  symmetric and not positive.
+  maxima and saddles. It is taken for a form too, where Newton's method fails and the Jacobian is
+  symmetric.
 
 What either has found is judged by one certificate (``judged``).
 """
@@ -233,12 +233,15 @@ class Problem:
         limit = NEWTON_STEPS if iterations is None else iterations
         progress = solve_in_parts(self._equations, low, high, self._steps, limit)
         # A Jacobian with negative curvature explains a failure, and casts doubt on an answer.
-        is_asked = bool(progress.failure) or progress.doubted
-        is_hill = is_asked and curves_down(progress, self._layers)
-        if not (progress.failure and is_hill):
+        if not progress.failure and not progress.doubted:
+            return progress, False
+        point = judge_symmetric(progress)
+        is_hill = point is not None and curves_down(point, self._layers)
+        if not progress.failure or point is None or iterations is not None:
             return progress, is_hill
 
-        # The form is the derivative of some energy: go down, and count the steps so far too.
+        # Where the Jacobian is symmetric everywhere, F is the derivative of an energy: go down, and
+        # count the steps so far too.
         self._equations.put_back()
         descent = self._descend(low, high, iterations)
         if descent.failure:
@@ -359,20 +362,22 @@ def choose_preconditioner(ranks: int) -> Mapping[str, object | None]:
     return {"pc_type": "icc"} if ranks == 1 else {"pc_type": "bjacobi", "sub_pc_type": "icc"}
 
 
-def curves_down(progress: Progress, layers: OptionLayers) -> bool:
-    """Say whether F has a symmetric Jacobian with a direction of negative curvature at the best u.
+def judge_symmetric(progress: Progress) -> Judged | None:
+    """Return the best u with its Jacobian, which later points have replaced. Collective.
 
-    Collective.
+    It is None where F is linear, or its Jacobian not symmetric.
     """
     best = progress.best
     equations = best.equations
     if best.broken or equations.constant:
-        return False
+        return None
     equations.put(best.x, best.left)
-    # The Jacobian there, which later points have replaced.
     point = Judged(equations, best.lower, best.upper, best.left)
-    if not is_symmetric(point.A, equations.comm):
-        return False
+    return point if is_symmetric(point.A, equations.comm) else None
+
+
+def curves_down(point: Judged, layers: OptionLayers) -> bool:
+    """Say whether a symmetric Jacobian has a direction of negative curvature. Collective."""
     model = Model(point, layers)
     negative = model.curves_down()
     model.close()
