@@ -102,10 +102,10 @@ class Problem:
     >>> u, v, load = own.Function(V), ufl.TestFunction(V), own.Constant(line, 8.0)
     >>> string = vi.Problem((u.dx(0) * v.dx(0) + load * v) * ufl.dx, u, bcs=[ends])
     >>> string.solve(lower=-0.5).active[0], string.solve(lower=lambda x: -0.5 - x[0]).active[0]
-    (3, 0)
+    (3, 1)
     >>> load.value = 64.0
     >>> string.solve(lower=-0.5).active[0]
-    5
+    7
     """
 
     def __init__(
