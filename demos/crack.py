@@ -76,17 +76,19 @@ class Bar:
             for at in (-0.5, 0.5)
         ]
         zero = dolfinx.fem.Constant(on, 0.0)
-        self.ends = [
+        pulled = [
             dolfinx.fem.dirichletbc(zero, ends[0], V),
             dolfinx.fem.dirichletbc(self.pull, ends[1], V),
         ]
-        self.sound = [dolfinx.fem.dirichletbc(zero, one, V) for one in ends] if held else []
+        sound = [dolfinx.fem.dirichletbc(zero, one, V) for one in ends] if held else []
         v, w = ufl.TestFunction(V), ufl.TrialFunction(V)
         left = (1.0 - self.d) ** 2 + LEFT
-        self.balance = left * ufl.inner(ufl.grad(w), ufl.grad(v)) * ufl.dx, zero * v * ufl.dx
+        balance = left * ufl.inner(ufl.grad(w), ufl.grad(v)) * ufl.dx, zero * v * ufl.dx
+        self.balance = vi.Problem(balance, self.u, bcs=pulled, method=ReducedNewton())
         strain = ufl.inner(ufl.grad(self.u), ufl.grad(self.u))  # twice the energy, E = 1
         inner = ufl.inner(ufl.grad(self.d), ufl.grad(v))
-        self.growth = (-(1.0 - self.d) * strain * v + self.d * v / WIDTH + WIDTH * inner) * ufl.dx
+        growth = (-(1.0 - self.d) * strain * v + self.d * v / WIDTH + WIDTH * inner) * ufl.dx
+        self.growth = vi.Problem(growth, self.d, bcs=sound)
         surface = 0.5 * (self.d**2 / WIDTH + WIDTH * ufl.inner(ufl.grad(self.d), ufl.grad(self.d)))
         parts = (0.5 * left * strain, surface, (1.0 - self.d) ** 2 * self.u.dx(0))
         self.parts = [compat.compile_form(one * ufl.dx) for one in parts]
@@ -97,8 +99,8 @@ class Bar:
         self.before.x.array[:] = self.d.x.array
         for _ in range(ROUNDS):
             last = self.d.x.array.copy()
-            linear = vi.solve(self.balance, self.u, bcs=self.ends, method=ReducedNewton())
-            result = vi.solve(self.growth, self.d, lower=self.before, upper=1.0, bcs=self.sound)
+            linear = self.balance.solve()
+            result = self.growth.solve(lower=self.before, upper=1.0)
             self.worst = max(self.worst, linear.certificate.worst, result.certificate.worst)
             self.rounds += 1
             if (
@@ -123,7 +125,7 @@ class Bar:
         """
         self.u.x.array[:] = 0.0
         self.before.x.array[:] = self.d.x.array > BROKEN
-        vi.solve(self.growth, self.d, lower=self.before, upper=1.0, bcs=self.sound)
+        self.growth.solve(lower=self.before, upper=1.0)
         return self.energies()[1]
 
 

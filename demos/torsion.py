@@ -79,16 +79,17 @@ class Bar:
         self.lower.x.array[:] = -self.upper.x.array
         edge = dolfinx.mesh.locate_entities_boundary(on, 1, lambda x: np.full(x.shape[1], True))
         zero = dolfinx.fem.Function(V)
-        self.bc = dolfinx.fem.dirichletbc(zero, dolfinx.fem.locate_dofs_topological(V, 1, edge))
+        bc = dolfinx.fem.dirichletbc(zero, dolfinx.fem.locate_dofs_topological(V, 1, edge))
         self.w = dolfinx.fem.Constant(on, 0.0)
         v = ufl.TestFunction(V)
-        self.F = ufl.inner(ufl.grad(self.u), ufl.grad(v)) * ufl.dx - 2.0 * self.w * v * ufl.dx
+        F = ufl.inner(ufl.grad(self.u), ufl.grad(v)) * ufl.dx - 2.0 * self.w * v * ufl.dx
+        self.problem = vi.Problem(F, self.u, bcs=[bc])
         self.volume = compat.compile_form(2.0 * self.u * ufl.dx)
 
     def twist(self, w: float) -> tuple[float, Any]:
-        """Return the torque and the result of vi.solve, which begins with what is in u."""
+        """Return the torque and the result of the problem, which begins with what is in u."""
         self.w.value = w
-        result = vi.solve(self.F, self.u, lower=self.lower, upper=self.upper, bcs=[self.bc])
+        result = self.problem.solve(lower=self.lower, upper=self.upper)
         return float(self.comm.allreduce(dolfinx.fem.assemble_scalar(self.volume))), result
 
 

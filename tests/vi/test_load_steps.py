@@ -130,6 +130,26 @@ def test_a_change_that_is_too_large_is_taken_in_parts(comm: Any) -> None:
     assert result.certificate.worst <= 1e-9 and np.max(np.abs(u.x.array - wanted)) <= 1e-7
 
 
+@pytest.mark.two_ranks
+def test_a_form_goes_down_where_newtons_method_fails(comm: Any) -> None:
+    """Half of the height at once: the work of F takes the place of the energy, which gives the same
+    answer. Who limits the steps gets no more of them."""
+    fields = []
+    for by_energy in (False, True):
+        block = Pressed(comm, 6, 2)
+        block.move(0.0, -0.5)
+        form = {"energy": block.energy} if by_energy else {"form": block.F}
+        result = vi.solve(u=block.u, lower=block.floor, bcs=[block.bc], **form)
+        assert result.certificate.worst <= 1e-9 and result.method == "trust region"
+        assert "at a local minimum" in result.reason
+        fields.append(block.u.x.array.copy())
+    assert np.max(np.abs(fields[1] - fields[0])) <= 1e-7
+    block = Pressed(comm, 6, 2)
+    block.move(0.0, -0.5)
+    with pytest.raises(StepFailure, match="no step of Newton's method improves u"):
+        vi.solve(block.F, block.u, lower=block.floor, bcs=[block.bc], iterations=50)
+
+
 def test_a_failure_gives_the_first_guess_back(comm: Any) -> None:
     """A bar that is pressed to less than nothing: u is as before, and the sentence names no
     matrix."""

@@ -37,6 +37,9 @@ VERSION: tuple[int, ...] = tuple(int(part) for part in dolfinx.__version__.split
 
 _BASIX_ELEMENTS = VERSION >= (0, 7)
 _DOFMAP_PER_CELL_TYPE = VERSION >= (0, 11)
+# how a vector treats what other ranks send: a name of dolfinx.la that changed in 0.6
+_la: Any = dolfinx.la
+_ADD = getattr(_la, "InsertMode" if hasattr(_la, "InsertMode") else "ScatterMode").add
 
 # Seconds to wait for a form that another process compiles: a busy machine may take more than the 10
 # of the default.
@@ -393,6 +396,48 @@ def assemble_matrix(form: Any) -> PETSc.Mat:
     matrix = fem_petsc.assemble_matrix(form)
     matrix.assemble()
     return matrix
+
+
+def create_matrix(form: Any, comm: MPI.Comm) -> PETSc.Mat:
+    """Make a matrix into which ``assemble_again`` assembles a compiled bilinear form. Collective.
+
+    Args:
+        form: the form.
+        comm: a communicator of the ranks of its mesh, which may last longer than this one.
+    """
+    given = assemble_matrix(form)
+    n, columns = given.getLocalSize()
+    mat = PETSc.Mat().createAIJ(
+        ((n, None), (columns, None)),
+        bsize=given.getBlockSize(),
+        csr=given.getValuesCSR(),
+        comm=comm,
+    )
+    # Assembly counts rows and columns on the rank, blocks of them where there are blocks.
+    maps = [
+        PETSc.LGMap().create(local.getBlockIndices(), bsize=local.getBlockSize(), comm=comm)
+        for local in given.getLGMap()
+    ]
+    mat.setLGMap(*maps)
+    given.destroy()
+    return mat
+
+
+def assemble_again(form: Any, mat: PETSc.Mat) -> None:
+    """Assemble a compiled bilinear form into a matrix that ``create_matrix`` made. Collective."""
+    mat.zeroEntries()
+    fem_petsc.assemble_matrix(mat, form)
+    mat.assemble()
+
+
+def assemble_into(form: Any, field: Any) -> None:
+    """Assemble a compiled linear form into the array of a Function. Collective.
+
+    Contributions of all ranks are added on the owner; ghost entries are left stale.
+    """
+    field.x.array[:] = 0.0
+    fem.assemble_vector(field.x.array, form)
+    field.x.scatter_reverse(_ADD)
 
 
 def assemble_vector(form: Any) -> PETSc.Vec:

@@ -1,2 +1,3 @@
-from .inequality import Result as Result
 from .inequality import solve as solve
+from .problem import Problem as Problem
+from .problem import Result as Result

@@ -12,7 +12,7 @@ import numpy as np
 from ..core.algebra import Array, lowest, max_abs, total
 from ..core.certificate import Certificate
 from ..core.verify import ROUNDING
-from .forms import Problem
+from .equations import Equations
 
 DIAGONAL = 1e-8  # of the largest: smaller entries of the Jacobian's diagonal count as this
 
@@ -26,6 +26,7 @@ class Judged:
     """Hold what is known at the present u of a problem; arrays are of its free unknowns.
 
     Attributes:
+        equations: those of F, with u.
         x, F: the free unknowns and the residual F(u; phi_i) at u.
         A, b: the linear problem about u, F(u) + J (x_new - x) = A x_new - b. Where held unknowns
             are not yet at their prescribed values (``left``), b moves them there: F in it has
@@ -38,22 +39,22 @@ class Judged:
             ``left``.
     """
 
-    def __init__(self, problem: Problem, lower: Array, upper: Array, left: float = 0.0) -> None:
+    def __init__(self, equations: Equations, lower: Array, upper: Array, left: float = 0.0) -> None:
         """Judge the present u. Collective.
 
         Args:
-            problem: the problem, with u.
+            equations: those of F, with u.
             lower: (n,) bounds of the free unknowns from below.
             upper: (n,) from above.
             left: share of the change of held unknowns that is still to come.
         """
-        self.problem = problem
+        self.equations = equations
         self.lower = lower
         self.upper = upper
         self.left = left
-        self.x = problem.x
-        residual = problem.assemble_residual()
-        self.A, self.gain = problem.linearise(left)
+        self.x = equations.x
+        residual = equations.assemble_residual()
+        self.A, self.gain = equations.linearise(left)
         self.F = residual + self.gain if left else residual
 
         # The linear problem, and the largest sizes on any rank of what it is made of: by one
@@ -62,11 +63,11 @@ class Judged:
         diagonal = np.abs(self.A.diagonal())
         self.b = Ax - self.F
         local = [max_abs(array) for array in (self.x, self.b, Ax, self.F, diagonal)]
-        sizes = problem.comm.max(np.nan_to_num(local, nan=np.inf, posinf=np.inf))
+        sizes = equations.comm.max(np.nan_to_num(local, nan=np.inf, posinf=np.inf))
         self.broken = not np.all(np.isfinite(sizes))
         x_max, b_max, Ax_max, F_max, most = sizes.tolist()
         self.diagonal = np.maximum(diagonal, DIAGONAL * most)
-        least = 0.0 if problem.constant else SMALL * problem.size
+        least = 0.0 if equations.constant else SMALL * equations.size
 
         # References of the certificate: displacements [of u] and forces [of F] that residuals are
         # compared with; one where all is zero.
@@ -92,7 +93,7 @@ class Judged:
         away = max(max_abs(below[at_lower]), max_abs(above[at_upper]))
         carried = max(b_max, Ax_max, ROUNDING * most * x_max, most * least) or 1.0
         scale = np.array([carried, x_ref, r_ref, x_ref])
-        worst = problem.comm.max(np.array([balance, behind, wrong, away])) / scale
+        worst = equations.comm.max(np.array([balance, behind, wrong, away])) / scale
         if self.broken or left:
             worst = np.full(len(worst), np.inf)
         self.certificate = Certificate(*worst.tolist())
@@ -109,7 +110,7 @@ class Judged:
         """
         with np.errstate(over="ignore", invalid="ignore"):
             r = x - np.clip(x - F / self.diagonal, self.lower, self.upper)
-            size = total(self.problem.comm, self.diagonal @ r**2)
+            size = total(self.equations.comm, self.diagonal @ r**2)
         return size if np.isfinite(size) else np.inf
 
     def put(self, x: Array, left: float) -> Array:
@@ -120,6 +121,6 @@ class Judged:
             left: share of the change of held unknowns that is then still to come. F comes with what
                 it will gain by that.
         """
-        self.problem.put(x, left)
-        F = self.problem.assemble_residual()
+        self.equations.put(x, left)
+        F = self.equations.assemble_residual()
         return F + (left / self.left) * self.gain if left else F

@@ -18,7 +18,14 @@ from ..core.step import StepProblem
 from ..core.surfaces import empty_surface
 from ..fem.matrices.petsc_algebra import PetscAlgebra, PetscMatrix, UnsymmetricAlgebra
 from ..fem.mesh.communicators import MpiComm
-from ..solvers.volume.route import Method, ReducedNewton, SemismoothNewton, TaoTron, Volume
+from ..solvers.volume.route import (
+    Method,
+    PreparedVolume,
+    ReducedNewton,
+    SemismoothNewton,
+    TaoTron,
+    Volume,
+)
 from .forms import make_error
 from .judged import Judged
 
@@ -30,28 +37,55 @@ def is_symmetric(A: PetscMatrix, comm: MpiComm) -> bool:
 
 
 class LinearSteps:
-    """Solve the linear problems of one call of ``vi.solve`` one after another.
+    """Solve the linear problems of a ``vi.Problem`` one after another.
 
-    A method that failed is tried last from then on: the tangents of one problem are alike.
+    A method that failed is tried last from then on: the tangents of one answer are alike. PETSc's
+    solvers are kept, as there is one matrix, whose entries change.
 
     Attributes:
-        failed: names of methods that have failed.
-        helps: whether no problem so far was given up by all methods.
+        settings: options of PETSc, and the tolerance.
+        given: the methods to try; those that suit A if there are none.
+        failed: names of methods that have failed on the way to this answer.
+        helps: whether no problem on this way was given up by all methods.
     """
 
-    def __init__(self, settings: Volume, given: Sequence[Method], comm: MpiComm) -> None:
+    def __init__(self, settings: Volume, given: Sequence[Method], comm: MpiComm, rows: int) -> None:
         """Begin.
 
         Args:
             settings: options of PETSc, and the tolerance.
             given: the methods to try; those that suit A if there are none.
             comm: of the mesh.
+            rows: number of the free unknowns of this rank.
         """
         self.settings = settings
         self.given = given
         self.comm = comm
+        zero = np.zeros(rows)
+        self._surface = replace(
+            empty_surface(comm, 1),
+            owned=np.arange(rows),
+            gap0=zero,
+            compliance=zero,
+            bilateral=np.zeros(rows, dtype=bool),
+        )
+        self._matrix: EffectiveMatrix | None = None
+        self._version = 0  # of the matrix
+        # by method and whether the matrix is symmetric; and whose solver knows its present entries
+        self._solvers: dict[tuple[str, bool], PreparedVolume] = {}
+        self._current: set[tuple[str, bool]] = set()
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin the way to another answer."""
         self.failed: set[str] = set()
         self.helps = True
+
+    def close(self) -> None:
+        """Free PETSc's solvers. Collective."""
+        for solver in self._solvers.values():
+            solver.close()
+        self._solvers.clear()
 
     def choose_methods(self, symmetric: bool) -> list[Method]:
         """Return the methods to try, in this order.
@@ -71,17 +105,11 @@ class LinearSteps:
         # The sort is stable: those that have failed go to the end, and all others stay in order.
         return sorted(self.given or suited, key=lambda method: type(method).__name__ in self.failed)
 
-    def solve(
-        self, A: PetscMatrix, b: Array, lower: Array, upper: Array, start: Array
-    ) -> tuple[Array, int, str]:
+    def solve(self, point: Judged) -> tuple[Array, int, str]:
         """Return the answer of the first method that finds it. Collective.
 
         Args:
-            A: the matrix (n, n).
-            b: (n,) right-hand side, in the unit of F.
-            lower: (n,) bounds of x from below, -inf for none.
-            upper: (n,) bounds of x from above, inf for none.
-            start: (n,) the x where to begin.
+            point: has the matrix A, the right-hand side b, the bounds, and the x where to begin.
 
         Returns:
             x (n,), the iterations, and the name of the method.
@@ -89,49 +117,68 @@ class LinearSteps:
         Raises:
             StepFailure: no method finds x; the error tells what each one said.
         """
-        comm = self.comm
-        symmetric = is_symmetric(A, comm)
-        methods = self.choose_methods(symmetric)
-
-        # A start from nothing: along b to the minimum of ½ x·A x - b·x, between the bounds. It
-        # tells the solvers the size of x.
-        bAb = total(comm, b @ (A @ b))
-        bb = total(comm, b @ b)
-        has_start = total(comm, np.any(start)) > 0.0
-        if bAb > 0.0 and not has_start:
-            start = np.clip(bb / bAb * b, lower, upper)
-
-        # The problem as a step of a body whose every unknown is in contact, with obstacles on both
-        # sides.
-        zero = np.zeros(A.rows)
-        none = np.zeros(A.rows, dtype=bool)
-        surface = replace(
-            empty_surface(comm, 1),
-            owned=np.arange(A.rows),
-            gap0=zero,
-            compliance=zero,
-            bilateral=none,
-        )
-        algebra = PetscAlgebra(comm.mpi) if symmetric else UnsymmetricAlgebra(comm.mpi)
-        matrix = EffectiveMatrix(A, algebra)
-        step = StepProblem(matrix, b, upper, surface, 1.0, start, none, 0.0, 0, lower=lower)
+        if point.equations.version != self._version:
+            self._version = point.equations.version
+            self._take_matrix(point.A)
+        step = self._pose(point)
 
         # The first method that finds an answer has it.
         failures: list[str] = []
-        for method in methods:
-            solver = replace(self.settings, method=method).prepare(matrix, surface, 1.0)
+        for method in self.choose_methods(self._symmetric):
+            name = type(method).__name__
+            solver = self._prepare(method, name)
             if failures:
                 solver.excuse_options()  # they were for the method before
             try:
                 result = solver.solve(step)
-                return np.clip(result.x, lower, upper), result.iterations, type(method).__name__
+                return np.clip(result.x, point.lower, point.upper), result.iterations, name
             except StepFailure as failure:
                 failures.append(str(failure))
-                self.failed.add(type(method).__name__)
-            finally:
-                solver.close()
+                self.failed.add(name)
         self.helps = False
         raise StepFailure("; ".join(failures))
+
+    def _take_matrix(self, A: PetscMatrix) -> None:
+        """Take the matrix, whose entries are new. Collective."""
+        comm = self.comm
+        self._symmetric = is_symmetric(A, comm)
+        algebra = PetscAlgebra(comm.mpi) if self._symmetric else UnsymmetricAlgebra(comm.mpi)
+        self._matrix = EffectiveMatrix(A, algebra)
+        self._current.clear()
+
+    def _prepare(self, method: Method, name: str) -> PreparedVolume:
+        """Return PETSc's solver of a method, the one before where there is one. Collective."""
+        assert self._matrix is not None
+        key = (name, self._symmetric)
+        if key not in self._solvers:
+            settings = replace(self.settings, method=method)
+            self._solvers[key] = settings.prepare(self._matrix, self._surface, 1.0)
+        elif key not in self._current:
+            self._solvers[key].renew()
+        self._current.add(key)
+        return self._solvers[key]
+
+    def _pose(self, point: Judged) -> StepProblem:
+        """Return the problem as a step of a body, every unknown of which is in contact.
+
+        There are obstacles on both sides. Collective.
+        """
+        A = point.A
+        b = point.b
+        start = np.clip(point.x, point.lower, point.upper)
+
+        # A start from nothing: along b to the minimum of ½ x·A x - b·x, between the bounds. It
+        # tells the solvers the size of x.
+        bAb = total(self.comm, b @ (A @ b))
+        bb = total(self.comm, b @ b)
+        has_start = total(self.comm, np.any(start)) > 0.0
+        if bAb > 0.0 and not has_start:
+            start = np.clip(bb / bAb * b, point.lower, point.upper)
+        none = np.zeros(A.rows, dtype=bool)
+        assert self._matrix is not None
+        return StepProblem(
+            self._matrix, b, point.upper, self._surface, 1.0, start, none, 0.0, 0, lower=point.lower
+        )
 
 
 def find_reduced_step(point: Judged) -> Array:
@@ -149,7 +196,7 @@ def find_reduced_step(point: Judged) -> Array:
     """
     x = point.x
     F = point.F
-    comm = point.problem.comm
+    comm = point.equations.comm
 
     # A step of Jacobi's method would lead to ``aim``. Unknowns that it would lead to a bound, or
     # beyond, are held by this bound: they go to it, and the others are solved for.

@@ -6,17 +6,20 @@ energy falls as the model says and shrinks where it does not, also where the ene
 number. J need not be positive definite: along a direction of negative curvature the step goes to
 the edge of the region. Reference: C.-J. Lin and J. J. Moré, 1999, Newton's method for large
 bound-constrained optimization problems (TRON).
+
+Where F alone is given and its Jacobian is symmetric, the work of F takes the place of the energy.
 """
 
 import numpy as np
 
 from ..core.algebra import Array
 from ..solvers.volume.options import OptionLayers
-from .forms import Problem
+from .equations import Equations
 from .judged import Judged
 from .model import Model
 from .newton import Progress, begin
 
+METHOD = "trust region"
 ACCEPTED = 1e-4  # the part of the promised decrease that a step must bring
 POOR = 0.25  # the part of it below which the radius shrinks
 GOOD = 0.75  # the part of it above which the radius grows
@@ -37,12 +40,17 @@ NO_DESCENT = (
 
 
 def minimise(
-    problem: Problem, lower: Array, upper: Array, tolerance: float, limit: int, layers: OptionLayers
+    equations: Equations,
+    lower: Array,
+    upper: Array,
+    tolerance: float,
+    limit: int,
+    layers: OptionLayers,
 ) -> Progress:
     """Go down to a local minimum between the bounds. Collective.
 
     Args:
-        problem: the energy, and u where to begin.
+        equations: of the energy, and u where to begin.
         lower: (n,) bounds of the free unknowns from below.
         upper: (n,) from above.
         tolerance: the largest residual of the certificate.
@@ -53,7 +61,8 @@ def minimise(
         Where it ends: at a point whose certificate is below the tolerance, and where no direction
         of negative curvature is found; or with a failure.
     """
-    progress = Progress(begin(problem, lower, upper), method="trust region")
+    equations.measure_work_from(None)
+    progress = Progress(begin(equations, lower, upper), method=METHOD)
     while progress.best.left and not progress.failure:
         carry_conditions(progress, layers)
     if not progress.failure:
@@ -67,19 +76,19 @@ def carry_conditions(progress: Progress, layers: OptionLayers) -> None:
     It goes as far as the energy is a number.
     """
     point = progress.best
-    problem = point.problem
+    equations = point.equations
     model = Model(point, layers)
     step, iterations = model.minimise(np.inf)
     model.close()
     length = 1.0
     while length > SHORTEST:
         left = point.left * (1.0 - length)
-        problem.put(point.x + length * step, left)
-        if np.isfinite(problem.evaluate_energy()):
+        equations.put(point.x + length * step, left)
+        if np.isfinite(equations.evaluate_energy()):
             # All the way the bounds hold exactly; on the way the point may still be outside.
             if length == 1.0:
-                problem.put(np.clip(problem.x, point.lower, point.upper))
-            next_point = Judged(problem, point.lower, point.upper, left)
+                equations.put(np.clip(equations.x, point.lower, point.upper))
+            next_point = Judged(equations, point.lower, point.upper, left)
             if not next_point.broken:
                 progress.advance(next_point)
                 progress.inner += iterations
@@ -102,7 +111,8 @@ def descend(progress: Progress, tolerance: float, limit: int, layers: OptionLaye
         layers: options of the preconditioner.
     """
     point = progress.best
-    energy = point.problem.evaluate_energy()
+    point.equations.measure_work_from(point.x)
+    energy = point.equations.evaluate_energy()
     if point.broken or not np.isfinite(energy):
         progress.failure = NOT_A_NUMBER
     else:
@@ -122,7 +132,7 @@ def _follow(
         layers: options of the preconditioner.
     """
     point = progress.best
-    problem = point.problem
+    equations = point.equations
     model = Model(point, layers)
     first = FIRST_RADIUS * model.measure_jacobi_step()
     radius = first
@@ -146,19 +156,20 @@ def _follow(
 
         # A step that brings enough is taken, unless nothing can be judged where it leads.
         if ratio > ACCEPTED:
-            next_point = Judged(problem, point.lower, point.upper)
+            next_point = Judged(equations, point.lower, point.upper)
             if not next_point.broken:
                 model.close()
                 point = next_point
                 energy = trial
+                equations.measure_work_from(point.x, energy)
                 model = Model(point, layers)
                 progress.advance(point)
                 share = 1.0
                 continue
             # Judging the broken point has replaced the Jacobian of this one: judge it again.
             model.close()
-            problem.put(point.x)
-            point = Judged(problem, point.lower, point.upper)
+            equations.put(point.x)
+            point = Judged(equations, point.lower, point.upper)
             model = Model(point, layers)
             radius = SHRINK * length
 
@@ -201,15 +212,15 @@ def _try_step(model: Model, point: Judged, step: Array, energy: float) -> tuple[
         The energy there, and what was gained over what the model promises; -inf where it promises
         nothing.
     """
-    problem = point.problem
+    equations = point.equations
     # The ratio of what was gained to what the model promised tells how far to trust the model.
     promised = -model.evaluate(step)
-    problem.put(np.clip(point.x + step, point.lower, point.upper))
-    trial = problem.evaluate_energy()
+    equations.put(np.clip(point.x + step, point.lower, point.upper))
+    trial = equations.evaluate_energy()
     gained = energy - trial
     # Differences of energies lose digits that the work of the forces has.
     if np.isfinite(trial) and abs(promised) <= DIGITS * max(abs(energy), abs(trial)):
-        gained = -0.5 * problem.dot(point.F + problem.assemble_residual(), step)
+        gained = -0.5 * equations.dot(point.F + equations.assemble_residual(), step)
     return trial, gained / promised if promised > 0.0 else -np.inf
 
 

@@ -35,7 +35,7 @@ class Model:
     """Hold the quadratic model about a judged point; ``close`` frees its preconditioners.
 
     Attributes:
-        point, problem: the judged point, and its problem.
+        point, equations: the judged point, and its equations.
         x, F, J, diagonal: those of the point, of free unknowns.
         low, high: bounds of steps s.
     """
@@ -44,7 +44,7 @@ class Model:
         """Make the model of a point; ``layers`` are options of the preconditioner."""
         self.point = point
         self.layers = layers
-        self.problem = point.problem
+        self.equations = point.equations
         self.x = point.x
         self.F = point.F
         self.J = point.A
@@ -64,11 +64,11 @@ class Model:
 
     def evaluate(self, s: Array) -> float:
         """Return q(s). Collective."""
-        return self.problem.dot(s, self.F + 0.5 * (self.J @ s))
+        return self.equations.dot(s, self.F + 0.5 * (self.J @ s))
 
     def measure_length(self, s: Array) -> float:
         """Return |s|. Collective."""
-        return float(np.sqrt(self.problem.dot(s, self.diagonal * s)))
+        return float(np.sqrt(self.equations.dot(s, self.diagonal * s)))
 
     def measure_jacobi_step(self) -> float:
         """Return |s| of one step of Jacobi's method between the bounds: a first measure of lengths.
@@ -89,7 +89,7 @@ class Model:
         for _ in range(ROUNDS):
             free = self._off_bounds(s)
             size = self._free_size(residual, free)
-            if size <= SMALLEST * first or not self.problem.count(free):
+            if size <= SMALLEST * first or not self.equations.count(free):
                 break
             # Superlinear convergence: the closer to the minimum, the more exact the step.
             aim = FORCING
@@ -103,7 +103,7 @@ class Model:
             s = next_s
             residual = self.F + self.J @ s
             is_same = np.array_equal(self._off_bounds(s), free)
-            if early or self.problem.all(is_same):
+            if early or self.equations.all(is_same):
                 break  # the edge of the region is reached, or no further bound
         return s, count
 
@@ -125,21 +125,21 @@ class Model:
             return None, iterations
 
         # The length.
-        self.problem.put(self.x)
-        energy = abs(self.problem.evaluate_energy())
-        curvature = -self.problem.dot(direction, self.J @ direction)
+        self.equations.put(self.x)
+        energy = abs(self.equations.evaluate_energy())
+        curvature = -self.equations.dot(direction, self.J @ direction)
         length = np.sqrt(2.0 * PART * energy / curvature) * self.measure_length(direction)
         # an energy of zero tells nothing: the size of the field, or of one where there is none
         if length == 0.0:
-            length = self.measure_length(np.full_like(self.x, self.problem.size or 1.0))
+            length = self.measure_length(np.full_like(self.x, self.equations.size or 1.0))
         s = direction * (share * length / self.measure_length(direction))
 
         # The side. Of two that differ by rounding the first is taken, whatever the number of ranks.
         sides = [self._clip(s), self._clip(-s)]
         energies = []
         for side in sides:
-            self.problem.put(self.x + side)
-            energies.append(self.problem.evaluate_energy())
+            self.equations.put(self.x + side)
+            energies.append(self.equations.evaluate_energy())
         is_second_lower = energies[0] > energies[1] + EVEN * abs(energies[1])
         return sides[1] if is_second_lower else sides[0], iterations
 
@@ -162,7 +162,7 @@ class Model:
     def _free_size(self, residual: Array, free: Mask) -> float:
         """Return the size of the residual at free unknowns, in the norm dual to |s|."""
         r = residual[free]
-        return float(np.sqrt(self.problem.dot(r, r / self.diagonal[free])))
+        return float(np.sqrt(self.equations.dot(r, r / self.diagonal[free])))
 
     def _cauchy(self, radius: float) -> Array:
         """Return a step along the projected direction of steepest descent, within the radius.
@@ -175,7 +175,7 @@ class Model:
         alpha = 1.0
         for _ in range(CAUCHY_HALVINGS):
             s = self._clip(start + alpha * direction)
-            slope = -self.problem.dot(s - start, self.diagonal * direction)
+            slope = -self.equations.dot(s - start, self.diagonal * direction)
             is_near = self.measure_length(s) <= max(radius, self.measure_length(start))
             if is_near and self.evaluate(s) - base <= DESCENT * slope:
                 return s
@@ -197,7 +197,7 @@ class Model:
         beta = 1.0
         for _ in range(SEARCH_HALVINGS):
             trial = self._clip(s + beta * w)
-            slope = self.problem.dot(residual, trial - s)
+            slope = self.equations.dot(residual, trial - s)
             if slope < 0.0 and self.evaluate(trial) - base <= DESCENT * slope:
                 return trial
             beta *= 0.5
@@ -209,9 +209,9 @@ class Model:
         Collective.
         """
         is_same = self._block is not None and np.array_equal(self._block.free, free)
-        if self._block is None or not self.problem.all(is_same):
+        if self._block is None or not self.equations.all(is_same):
             self.close()
-            matrix = as_petsc(PetscAlgebra(self.problem.comm.mpi).block(self.J, free))
+            matrix = as_petsc(PetscAlgebra(self.equations.comm.mpi).block(self.J, free))
             self._block = Block(free, matrix, Preconditioner(matrix, self.layers))
         return self._block
 
@@ -234,7 +234,7 @@ class Model:
             edge or by negative curvature.
         """
         _, block, precondition = self._block_on(free)
-        dot = self.problem.dot
+        dot = self.equations.dot
         D = self.diagonal[free]
         s_free = s[free]
         held_square = dot(s[~free], self.diagonal[~free] * s[~free])
@@ -293,14 +293,14 @@ class Model:
         """
         push_up, push_down = self.point.push
         free = self._off_bounds(np.zeros_like(self.x)) & (push_up == 0.0) & (push_down == 0.0)
-        if not self.problem.count(free):
+        if not self.equations.count(free):
             return None, 0
 
         # Conjugate gradients for J w = load, of which only the directions d are wanted: they end at
         # the first one along which the curvature is below zero by more than rounding.
-        load = self.diagonal * _uneven(self.problem.locate_unknowns())
+        load = self.diagonal * _uneven(self.equations.locate_unknowns())
         _, block, precondition = self._block_on(free)
-        dot = self.problem.dot
+        dot = self.equations.dot
         r = load[free]
         z = precondition(r)
         d = z.copy()

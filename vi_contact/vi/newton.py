@@ -11,15 +11,13 @@ cell.
 """
 
 import logging
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..core.algebra import Array
 from ..core.errors import StepFailure
-from ..solvers.volume.route import Method, Volume
-from .forms import Problem
+from .equations import Equations
 from .judged import Judged
 from .linear_steps import LinearSteps, find_reduced_step
 
@@ -71,7 +69,7 @@ class Progress:
         self.steps += 1
 
 
-def begin(problem: Problem, lower: Array, upper: Array, *, carry: bool = True) -> Judged:
+def begin(equations: Equations, lower: Array, upper: Array, *, carry: bool = True) -> Judged:
     """Write where to begin into u, and judge it. Collective.
 
     Where conditions and bounds change a problem that is not linear, this is u as it was given, and
@@ -79,7 +77,7 @@ def begin(problem: Problem, lower: Array, upper: Array, *, carry: bool = True) -
     with the conditions and between the bounds.
 
     Args:
-        problem: with u as it was given.
+        equations: with u as it was given.
         lower: (n,) bounds of the free unknowns from below.
         upper: (n,) from above.
         carry: True to carry small changes too; False to write into u at once what leaves forces
@@ -87,26 +85,25 @@ def begin(problem: Problem, lower: Array, upper: Array, *, carry: bool = True) -
     """
     # Try the u that was given first, with the change of the conditions (all of it, 1.0) still to
     # come. To carry it is worth a step only if it would leave larger forces when written at once.
-    given = problem.x
-    if not problem.constant and problem.moves(lower, upper):
-        problem.put(given, 1.0)
-        point = Judged(problem, lower, upper, 1.0)
+    given = equations.x
+    if not equations.constant and equations.moves(lower, upper):
+        equations.put(given, 1.0)
+        point = Judged(equations, lower, upper, 1.0)
         if not point.broken:
             changed = np.clip(given, lower, upper)
             forces = point.measure_natural_residual(changed, point.put(changed, 0.0))
             if carry or forces > SMALL_CHANGE * point.measure_natural_residual(point.x, point.F):
-                problem.put(given, 1.0)
+                equations.put(given, 1.0)
                 return point
-    problem.put(np.clip(given, lower, upper))
-    return Judged(problem, lower, upper)
+    equations.put(np.clip(given, lower, upper))
+    return Judged(equations, lower, upper)
 
 
 def solve_in_parts(
-    problem: Problem,
+    equations: Equations,
     lower: Array,
     upper: Array,
-    settings: Volume,
-    methods: Sequence[Method],
+    steps: LinearSteps,
     limit: int,
 ) -> Progress:
     """Return where Newton's method ends. Collective.
@@ -115,76 +112,73 @@ def solve_in_parts(
     in parts, each from the answer of the part before.
 
     Args:
-        problem: with u as it was given.
+        equations: with u as it was given.
         lower: (n,) bounds of the free unknowns from below.
         upper: (n,) from above.
-        settings: of the methods for linear problems, with the tolerance of the answer.
-        methods: those to take; none for those that suit.
+        steps: solves linear problems, and has the tolerance of the answer.
         limit: number of steps, at most.
     """
-    moves = not problem.constant and problem.moves(lower, upper)
-    whole = run_newton(problem, lower, upper, settings, methods, limit, carry=False)
+    moves = not equations.constant and equations.moves(lower, upper)
+    whole = run_newton(equations, lower, upper, steps, limit, carry=False)
     if not whole.failure or not moves:
         return whole
 
     # Half of the change first, or all of it where it was written into u at once; of a part that
     # fails half.
-    problem.put_back()
+    equations.put_back()
     reached = 0.0
     part = 1.0 if whole.at_once else 0.5
-    steps = whole.steps
+    count = whole.steps
     inner = whole.inner
     while part >= SMALLEST_PART:
-        before = np.array(problem.u.x.array)
-        problem.aim(reached + part)
-        progress = run_newton(problem, lower, upper, settings, methods, min(limit, STEPS_OF_A_PART))
-        steps += progress.steps
+        before = np.array(equations.u.x.array)
+        equations.aim(reached + part)
+        progress = run_newton(equations, lower, upper, steps, min(limit, STEPS_OF_A_PART))
+        count += progress.steps
         inner += progress.inner
         if progress.failure:
-            problem.u.x.array[:] = before
+            equations.u.x.array[:] = before
             part *= 0.5
             continue
-        problem.put(progress.best.x)
+        equations.put(progress.best.x)
         reached += part
         if reached == 1.0:
-            progress.steps = steps
+            progress.steps = count
             progress.inner = inner
             return progress
-    problem.put_back()
+    equations.put_back()
     return whole
 
 
 def run_newton(
-    problem: Problem,
+    equations: Equations,
     lower: Array,
     upper: Array,
-    settings: Volume,
-    methods: Sequence[Method],
+    steps: LinearSteps,
     limit: int,
     *,
     carry: bool = True,
 ) -> Progress:
-    """Return where Newton's method ends: below the tolerance of the settings, or with a failure.
+    """Return where Newton's method ends: below the tolerance, or with a failure.
 
     Collective.
 
     Args:
-        problem: with u where it begins.
+        equations: with u where it begins.
         lower: (n,) bounds of the free unknowns from below.
         upper: (n,) from above.
-        settings: of the methods for linear problems, with the tolerance of the answer.
-        methods: those to take; none for those that suit.
+        steps: solves linear problems, and has the tolerance of the answer.
         limit: number of steps, at most.
         carry: see ``begin``.
     """
-    point = begin(problem, lower, upper, carry=carry)
+    point = begin(equations, lower, upper, carry=carry)
     progress = Progress(point, at_once=point.left == 0.0)
-    steps = LinearSteps(settings, methods, problem.comm)
-    limit = min(limit, REFINEMENTS) if problem.constant else limit
+    steps.begin()
+    limit = min(limit, REFINEMENTS) if equations.constant else limit
 
     # ``point`` is the present u, ``best`` the one with the smallest certificate; while conditions
     # are still to be met (``left``) no certificate is finite, and the last point is the best.
-    while progress.best.certificate.worst > settings.tolerance:
+    while progress.best.certificate.worst > steps.settings.tolerance:
         if point.broken:
             progress.failure = NO_STEP if progress.steps else NOT_A_NUMBER
             return progress
@@ -195,7 +189,7 @@ def run_newton(
         progress.doubted = bool(steps.failed)
         if left is None:
             return progress
-        point = Judged(problem, lower, upper, left)
+        point = Judged(equations, lower, upper, left)
         progress.steps += 1
         is_better = point.certificate.worst < progress.best.certificate.worst
         if is_better or progress.best.left:
@@ -222,7 +216,7 @@ def take_step(progress: Progress, point: Judged, steps: LinearSteps) -> float | 
     ways = [take_linear_step, take_reduced_step]
     if not steps.helps:
         ways.reverse()
-    if point.problem.constant:
+    if point.equations.constant:
         ways = [take_linear_step]
     for take in ways:
         left = take(progress, point, steps)
@@ -243,13 +237,10 @@ def take_linear_step(progress: Progress, point: Judged, steps: LinearSteps) -> f
     Returns:
         The share of the change of held unknowns that is then left; None where it fails.
     """
-    start = np.clip(point.x, point.lower, point.upper)
     try:
-        x, iterations, progress.method = steps.solve(
-            point.A, point.b, point.lower, point.upper, start
-        )
+        x, iterations, progress.method = steps.solve(point)
     except StepFailure as failure:
-        progress.failure = UNHELD if point.problem.constant else NO_STEP
+        progress.failure = UNHELD if point.equations.constant else NO_STEP
         log.debug("vi.solve: %s", failure)
         return None
     progress.inner += iterations
@@ -286,9 +277,9 @@ def advance(point: Judged, target: Array) -> float | None:
     Returns:
         The share of the change of held unknowns that is then left; None where no length helps.
     """
-    problem = point.problem
-    if problem.constant:
-        problem.put(target)
+    equations = point.equations
+    if equations.constant:
+        equations.put(target)
         return 0.0
     # Bounds widened by both ends, which may lie outside: on the way nothing leaves them but by
     # rounding.

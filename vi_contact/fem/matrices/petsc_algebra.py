@@ -384,10 +384,8 @@ class PetscAlgebra:
 
     def block(self, A: Matrix, mask: Mask) -> Matrix:
         """Return the rows and columns of A of the masked unknowns."""
-        mat = as_petsc(A).mat
-        rows = (mat.getOwnershipRange()[0] + np.flatnonzero(mask)).astype(PETSc.IntType)
-        chosen = PETSc.IS().createGeneral(rows, comm=mat.comm)
-        return PetscMatrix(mat.createSubMatrix(chosen, chosen))
+        chosen = make_index_set(as_petsc(A), mask)
+        return PetscMatrix(as_petsc(A).mat.createSubMatrix(chosen, chosen))
 
     def factor(self, A: Matrix) -> Factor:
         """Return a factor of A."""
@@ -421,6 +419,12 @@ class UnsymmetricAlgebra(PetscAlgebra):
     def contact_last(self, A: Matrix, last: Indices) -> None:
         """Return None: there is no factor with these unknowns last."""
         return None
+
+
+def make_index_set(A: PetscMatrix, mask: Mask) -> Any:
+    """Return PETSc's index set of the owned rows that are masked."""
+    rows = A.mat.getOwnershipRange()[0] + np.flatnonzero(mask)
+    return PETSc.IS().createGeneral(rows.astype(PETSc.IntType), comm=A.mat.comm)
 
 
 def triple_product(K: Any, P: Any) -> Any:

@@ -198,6 +198,17 @@ class PreparedVolume:
         self._driver = None
         self._friction = None
 
+    def renew(self) -> None:
+        """Take the entries of A again, which have changed in place. Collective.
+
+        Its pattern is the same, and there are no springs.
+        """
+        self._scaled.renew()
+        if self._friction is not None:
+            self.close()
+        if self._driver is not None:
+            self._driver.renew()
+
     def solve(self, step: StepProblem) -> StepResult:
         """Return the answer to a step. Collective.
 

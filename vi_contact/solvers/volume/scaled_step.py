@@ -40,6 +40,10 @@ class ScaledStep:
         self.tolerance = tolerance
         self._norm = system.norm()
 
+    def renew(self) -> None:
+        """Measure A again, whose entries have changed. Collective."""
+        self._norm = self.system.norm()
+
     def set(self, step: StepProblem, start: Array) -> None:
         """Take a step that starts from z = start (n,). Collective."""
         system = self.system

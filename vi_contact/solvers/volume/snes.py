@@ -112,6 +112,11 @@ class SnesDriver:
             return int(self.reasons.CONVERGED_FNORM_RELATIVE)
         return 0
 
+    def renew(self) -> None:
+        """Take the entries of A again, which have changed; without friction."""
+        if isinstance(self._jacobian, AssembledJacobian):
+            self._jacobian.renew()
+
     def destroy(self) -> None:
         """Free the PETSc objects; collective."""
         for item in (self.solver, self._jacobian, self._y, self._F, self._lower, self._upper):
@@ -181,6 +186,10 @@ class AssembledJacobian:
             self._ratio = ratio
             self._copy()
             self.mat.setOption(PETSc.Mat.Option.SPD, self._symmetric)
+
+    def renew(self) -> None:
+        """Copy A again at the next step, as its entries have changed."""
+        self._ratio = np.nan
 
     def evaluate(self, snes: Any, y: Any, J: Any, P: Any) -> None:
         """Do nothing when PETSc calls for a Jacobian: the matrix is constant.

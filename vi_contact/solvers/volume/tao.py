@@ -50,13 +50,14 @@ class TaoDriver:
         self._scaled = scaled
         self._layers = layers
         self._hessian = AssembledJacobian(scaled.system)
-        self._y, self._gradient = self._hessian.mat.createVecs()
+        self._y = self._hessian.mat.createVecRight()
         self._lower = self._y.duplicate()
         self._upper = self._y.duplicate()
         self.solver = PETSc.TAO().create(scaled.system.comm)
         self.solver.setOptionsPrefix(layers.prefix)
         self.solver.setType("tron")
-        self.solver.setObjectiveGradient(weakly(scaled.write_gradient), self._gradient)
+        # No vector for the gradient is given: TRON makes one of its own, and forgets the given one.
+        self.solver.setObjectiveGradient(weakly(scaled.write_gradient), None)
         self.solver.setHessian(weakly(self._hessian.evaluate), self._hessian.mat)
         self.solver.setVariableBounds((self._lower, self._upper))
         self.solver.setSolution(self._y)
@@ -92,9 +93,12 @@ class TaoDriver:
 
     def destroy(self) -> None:
         """Free the PETSc objects; collective."""
-        vectors = (self._y, self._gradient, self._lower, self._upper)
-        for item in (self.solver, self._hessian, *vectors):
+        for item in (self.solver, self._hessian, self._y, self._lower, self._upper):
             item.destroy()
+
+    def renew(self) -> None:
+        """Take the entries of A again, which have changed."""
+        self._hessian.renew()
 
     def _test(self, tao: Any) -> int | None:
         """Return PETSc's reason to stop by our verdict; None to go on.
