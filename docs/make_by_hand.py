@@ -1,21 +1,23 @@
 """Write docs/guide/by_hand.md: ten cases, calculated by hand and run.
 
-    python3 docs/make_by_hand.py                  # write the page: after every change of docs/by_hand
-    python3 docs/make_by_hand.py --check          # say whether it is up to date
-    python3 docs/make_by_hand.py --run            # run all cases first, in some minutes
-    python3 docs/make_by_hand.py --run quay wall  # these only, beside what is stored
-    python3 docs/make_by_hand.py --steps FILE     # run the wall under this record at three time steps
+    python3 docs/make_by_hand.py                 # write the page, after a change of docs/by_hand
+    python3 docs/make_by_hand.py --check         # say whether it is up to date
+    python3 docs/make_by_hand.py --run           # run all cases first, in some minutes
+    python3 docs/make_by_hand.py --run quay wall # these only, beside what is stored
 
 docs/by_hand has a file for each case. Its lines are worked off from top to bottom: a formula knows
 what is given, g, and the symbols of the lines above it. ``sheet`` is arithmetic of columns of the
 history, and ``at`` the row: rest, largest, or change from rest to the end. ``period`` is a natural
 period of the model, of a case with other ``settings`` if there are any. Run folders are left in
-build/by_hand; what was found in them is stored in docs/by_hand/found.csv.
+build/by_hand; what was found in them is stored in docs/by_hand/found.csv. docs/make_wall_steps.py
+stores the table at the end of the page.
 """
 
 from __future__ import annotations
 
+import contextlib
 import csv
+import io
 import json
 import re
 import sys
@@ -75,9 +77,20 @@ says what the formula may be off, and was written down with it:
 - A percentage is that of an estimate. *Orientation* in the column *basis* marks formulas of
   another model, such as soil that yields. An accuracy *of B* is a share of that length.
 
-The last column is *sheet* over *by hand*. Where it is outside of the accuracy, a sentence below
-the table says why. The page is written by `docs/make_by_hand.py` from the files in `docs/by_hand`
-and stored results. `python3 docs/make_by_hand.py --run` computes them anew.
+The last column is *sheet* over *by hand*, or their difference as a share of a length. Where it is
+outside of the accuracy, a sentence below the table says why. The page is written by
+`docs/make_by_hand.py` from the files in `docs/by_hand` and stored results.
+`python3 docs/make_by_hand.py --run` computes them anew.
+"""
+
+STEPS_HEAD = """## The wall at three time steps
+
+This is the shipped wall under a record, at time steps of 10, 5 and 2.5 ms. The record is El Centro
+1940, component north-south, in the version of Peknold: 31.2 s with a peak of 0.319 g. It has a
+value every 20 ms and is not part of the package. `docs/make_wall_steps.py FILE` repeats the runs.
+"""
+
+STEPS_FOOT = """TODO
 """
 
 
@@ -224,17 +237,22 @@ def find_periods(case: Path, settings: tuple[str, ...], out: Path) -> list[float
     arguments = ["run", str(case), "--check", "--quiet", "--out", str(out)]
     for setting in settings:
         arguments += ["--set", setting]
-    if command(arguments) != 0:
+    with contextlib.redirect_stdout(io.StringIO()):
+        status = command(arguments)
+    if status != 0:
         raise SystemExit(f"{case.name} cannot be checked")
     model = json.loads((out / "model.json").read_text(encoding="utf-8"))
     return [float(period) for period in model["periods"]]
 
 
-def run_case(calculation: Calculation, out: Path, settings: Sequence[str] = ()) -> dict[str, float]:
-    """Run a case and return what its lines are compared with, by symbols.
+def run_case(
+    calculation: Calculation, wanted: Sequence[Line], *, out: Path, settings: Sequence[str] = ()
+) -> dict[str, float]:
+    """Run a case and return what lines are compared with, by symbols.
 
     Args:
         calculation: of the case.
+        wanted: lines that a run has the numbers of.
         out: folder of the run, and of models beside it.
         settings: of a shorter run, say.
     """
@@ -243,7 +261,6 @@ def run_case(calculation: Calculation, out: Path, settings: Sequence[str] = ()) 
     from vi_contact.practice.studies import comparisons, read_case
 
     path = ROOT / calculation.case
-    wanted = [line for line in calculation.lines if line.is_compared]
     history = read_case(path, list(settings)).run(MPI.COMM_SELF, out=out, progress=False).history
     checks = {}
     if any(line.check for line in wanted):
@@ -314,7 +331,10 @@ def row_of(
     # Round-off of a number that is zero tells nothing.
     if line.is_exact and value == 0.0 and calculation.agrees(line, found[key]):
         return [*cells, calculation.write(line, 0.0), ""]
-    ratio = write_number(found[key] / value, 6 if line.is_exact else 3) if value else "-"
+    if line.scale:
+        share = 100.0 * (found[key] - value) / calculation.scales[line.symbol]
+        return [*cells, calculation.write(line, found[key]), f"{share:+.2g} % of {line.scale}"]
+    ratio = write_number(found[key] / value, 6 if line.is_exact else 3)
     return [*cells, calculation.write(line, found[key]), ratio]
 
 
@@ -338,13 +358,32 @@ def section(calculation: Calculation, found: Mapping[tuple[str, str], float]) ->
 def find_unexplained(
     calculations: Sequence[Calculation], found: Mapping[tuple[str, str], float]
 ) -> Iterator[str]:
-    """Yield numbers beyond their accuracy without a reason, and reasons without such a number."""
+    """Yield numbers beyond their accuracy without a reason."""
     for calculation in calculations:
         for line in calculation.lines:
             key = calculation.name, line.symbol
-            if line.is_compared and key in found:
-                if calculation.agrees(line, found[key]) == bool(line.why):
-                    yield f"{calculation.name}: {line.symbol}: {found[key]:.6g}"
+            if line.why or not line.is_compared or key not in found:
+                continue
+            if not calculation.agrees(line, found[key]):
+                yield f"{calculation.name}: {line.symbol}: {found[key]:.6g}"
+
+
+def steps_section() -> Iterator[str]:
+    """Yield the section on the wall at three time steps; nothing before these runs."""
+    if not STEPS.exists():
+        return
+    with STEPS.open(encoding="utf-8", newline="") as file:
+        stored = list(csv.DictReader(file))
+    yield STEPS_HEAD
+    columns = list(dict.fromkeys(row["dt"] for row in stored))
+    rows: dict[str, list[str]] = {}
+    for row in stored:
+        factor, unit = choose_unit(row["unit"], UNITS, slice_thickness=1.0)
+        number = write_number(factor * float(row["value"]))
+        name = row["name"] + (f" [{unit}]" if unit != "-" else "")
+        rows.setdefault(name, [name]).append(number)
+    yield from table(["", *(f"{1e3 * float(dt):g} ms" for dt in columns)], list(rows.values()))
+    yield STEPS_FOOT
 
 
 def written() -> str:
@@ -353,6 +392,7 @@ def written() -> str:
     lines = [HEAD]
     for name in NAMES:
         lines += section(read_calculation(name), found)
+    lines += steps_section()
     return "\n".join(lines)
 
 
@@ -364,13 +404,14 @@ def main() -> int:
         found = read_found()
         for name in names:
             calculation = read_calculation(name)
-            for symbol, value in run_case(calculation, RUNS / name).items():
+            wanted = [line for line in calculation.lines if line.is_compared]
+            for symbol, value in run_case(calculation, wanted, out=RUNS / name).items():
                 found[name, symbol] = value
             write_found(found)
             print(name, flush=True)
     unexplained = list(find_unexplained([read_calculation(name) for name in NAMES], read_found()))
     for one in unexplained:
-        print(f"a reason is missing, or stands without a difference: {one}", file=sys.stderr)
+        print(f"a line beyond its accuracy needs a reason, why = …: {one}", file=sys.stderr)
     if "--check" not in arguments:
         PAGE.write_text(written(), encoding="utf-8")
     elif PAGE.read_text(encoding="utf-8") != written():
