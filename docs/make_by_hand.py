@@ -90,7 +90,15 @@ This is the shipped wall under a record, at time steps of 10, 5 and 2.5 ms. The 
 value every 20 ms and is not part of the package. `docs/make_wall_steps.py FILE` repeats the runs.
 """
 
-STEPS_FOOT = """TODO
+STEPS_FOOT = """- **Peaks of thrust and moment last one step** and grow as the step is halved.
+  They are impacts: the fill, of which the stem has parted, strikes it. No number of these rows is
+  the limit, and none may be signed for.
+- **The mean of the thrust over 20 ms** hardly depends on the step. It is 1.4 times the thrust of
+  Mononobe and Okabe under 0.25 g. The mean of the moment still falls as the step is halved.
+- **Sliding, sway, open share, normal force and pressure under the toe** change little with the step
+  and can be read at 10 ms. Sliding is along x: the wall goes to the left, away from its fill.
+- **The thrust at the end is zero.** Elastic fill keeps its place, and a wall that has slid by
+  2.6 mm does not touch it any more. Real fill follows the wall.
 """
 
 
