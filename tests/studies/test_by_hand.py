@@ -19,7 +19,14 @@ from vi_contact.practice.cli.entry import main
 
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).resolve().parents[2]
-OWN = ("cantilever", "quay", "buttress", "two_towers", "monument")  # the cases of demos/cases
+# the cases of demos/cases; the larger ones take some seconds
+OWN = [
+    "quay",
+    "buttress",
+    "monument",
+    pytest.param("cantilever", marks=pytest.mark.slow),
+    pytest.param("two_towers", marks=pytest.mark.slow),
+]
 # rest is the first row of any run
 STATICS = ["run.steps=1", "run.t_end=", "fields="]
 
