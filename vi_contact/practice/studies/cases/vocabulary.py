@@ -27,7 +27,7 @@ from ....core import (
 )
 from ....core.arguments import check_arguments
 from ....core.corners import FEATURE_ANGLE
-from ....core.quantities import RATIO, Positive, Unit
+from ....core.quantities import RATIO, NotNegative, Positive, Unit
 from ....core.system import SemiDiscreteSystem
 from ....core.units import STANDARD_GRAVITY
 from ....fem import (
@@ -91,6 +91,10 @@ _KINDS: Mapping[ModuleType, tuple[Any, ...]] = {  # room -> the kinds of things 
 }
 
 
+# of a table [[contact]]: ``friction_of_tables`` reads it
+FrictionCoefficient = Annotated[float, NotNegative, RATIO]
+
+
 @dataclass(frozen=True)
 class MeshFile:
     """Hold what [mesh] makes of type = "read_mesh": the path of a file for ``fem.read_mesh``."""
@@ -136,6 +140,7 @@ def surface(
     springs: Annotated[float | None, Unit("Pa/m")] = None,
     frictionless_corners: bool = False,
     hinges: bool = False,
+    mu: FrictionCoefficient | None = None,
     name: str = "",
 ) -> ContactSurface:
     """Make a ``contact_surface``.
@@ -150,6 +155,7 @@ def surface(
         springs: foundation modulus [Pa/m] of the springs on which it rests; None: without.
         frictionless_corners: whether nodes with several conditions slide freely over their faces.
         hinges: whether the body may hang together with another one by nodes of this boundary.
+        mu: coefficient of friction of this surface; None: that of [friction].
         name: of the surface, as ``part`` of recorders.
     """
     result = fem.contact_surface(
@@ -173,6 +179,7 @@ def pair(
     held: bool = False,
     frictionless_corners: bool = False,
     hinges: bool = False,
+    mu: FrictionCoefficient | None = None,
     name: str = "",
 ) -> ContactSurface:
     """Make a ``contact_pair``; held: ``.bilateral_everywhere()``; the others: as of ``surface``.
@@ -187,6 +194,7 @@ def pair(
         held: as of ``surface``.
         frictionless_corners: as of ``surface``.
         hinges: as of ``surface``.
+        mu: as of ``surface``.
         name: as of ``surface``.
     """
     result = fem.contact_pair(
