@@ -1,6 +1,7 @@
 """``vi-contact post peaks|spectrum|transfer|loop|checks``: options and what each does."""
 
 import argparse
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -35,6 +36,9 @@ CHECKS_HEADER = (
     "unit",
     "ratio",
     "applies",
+    "lasted_s",
+    "reading",
+    "notes",
 )
 
 
@@ -302,39 +306,62 @@ def _compare_with_formulas(options: argparse.Namespace) -> str:
         raise InputError(
             f"{options.folder}: its case has no [[check]]: add one, docs/guide/checks.md lists them"
         )
-    rows = []
-    lines = []
+    write_csv(table, CHECKS_HEADER, [_make_row(result) for result in results])
+
+    # A check that compares a thrust and its moment says its formula once.
+    lines: list[str] = []
+    before = ""
     for result in results:
-        inputs = _list_inputs(result)
-        rows.append(
-            [
-                result.name,
-                result.formula,
-                result.source,
-                result.range,
-                inputs,
-                result.expected,
-                result.found,
-                result.unit,
-                result.ratio,
-                result.applies,
-            ]
+        lines.append(f"{result.name}: {_describe_outcome(result)}")
+        about = (
+            f"    {result.formula}   ({result.source})\n"
+            f"    for {result.range}\n"
+            f"    {_list_inputs(result)}"
         )
-        if result.applies:
-            outcome = f"does not apply: {result.applies}"
-        else:
-            outcome = (
-                f"expected {result.expected:.5g}, found {result.found:.5g} {result.unit}, "
-                f"ratio {result.ratio:.4g}"
-            )
-        lines += [
-            f"{result.name}: {outcome}",
-            f"    {result.formula}   ({result.source})",
-            f"    for {result.range}",
-            f"    {inputs}",
-        ]
-    write_csv(table, CHECKS_HEADER, rows)
+        if about != before:
+            lines.append(about)
+        before = about
+        lines += [f"    note: {note}" for note in result.notes]
+
+    # What the ratios mean, once for all checks of which it is the same.
+    names: dict[str, list[str]] = {}
+    for result in results:
+        if result.reading and not result.applies:
+            names.setdefault(result.reading, []).append(result.name)
+    lines += [f"{'; '.join(owners)}: {reading}" for reading, owners in names.items()]
     return "\n".join([*lines, f"table: {table}"])
+
+
+def _make_row(result: "Comparison") -> list[Any]:
+    """Return the row of a comparison in the table of checks."""
+    return [
+        result.name,
+        result.formula,
+        result.source,
+        result.range,
+        _list_inputs(result),
+        result.expected,
+        result.found,
+        result.unit,
+        result.ratio,
+        result.applies,
+        result.lasted,
+        result.reading,
+        "; ".join(result.notes),
+    ]
+
+
+def _describe_outcome(result: "Comparison") -> str:
+    """Return both numbers and their ratio, or why they are not compared."""
+    if result.applies:
+        return f"does not apply: {result.applies}"
+    outcome = (
+        f"expected {result.expected:.5g}, found {result.found:.5g} {result.unit}, "
+        f"ratio {result.ratio:.4g}"
+    )
+    if math.isfinite(result.lasted):
+        outcome += f", above 90 % of it for {result.lasted:.3g} s"
+    return outcome
 
 
 def _list_inputs(result: "Comparison") -> str:

@@ -156,9 +156,9 @@ def describe(
         - groups: name, kind;
         - bodies: name, cells, mass [kg], material;
         - supports: kind, groups, components;
-        - contact: name, points, size [m²], friction, mu: of Coulomb's law, nodes: a sentence, places, others: kind ->
-          places, sides: name, h [m] and G [Pa] of both; of a body without mesh gap [m] in the place
-          of a size;
+        - contact: name, points, size [m²], friction, mu: of Coulomb's law, nodes: a sentence,
+          places, others: kind -> places, sides: name, h [m] and G [Pa] of both; of a body without
+          mesh gap [m] in the place of a size;
         - layers: width [m], speed [m/s], passage: their quotient [s];
         - periods [s], damping_ratios of their modes and rigid_motions with the contact closed where
           it touches at the start, and sticking where there is friction; periods_open, the first one

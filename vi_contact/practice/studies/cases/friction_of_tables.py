@@ -47,8 +47,8 @@ def _refuse_other_law(whole: FrictionLaw, contact: Call) -> None:
     one_number = isinstance(whole, Coulomb) and not isinstance(whole.mu, tuple)
     if not one_number and not isinstance(whole, Frictionless):
         raise contact.spot.make_table_error(
-            f"has mu, which is Coulomb's, and [friction] is {type(whole).__name__}: give [friction] "
-            'type = "Coulomb" with one mu, or leave the mu of the table out'
+            f"has mu, which is Coulomb's, and [friction] is {type(whole).__name__}: give "
+            '[friction] type = "Coulomb" with one mu, or leave the mu of the table out'
         )
 
 
