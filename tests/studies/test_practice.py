@@ -112,7 +112,7 @@ def test_wall_stands_between_active_pressure_and_that_at_rest(tmp_path: Path) ->
     assert history["N_stem"].max() > 1.05 * history["N_stem"][0]
     found = {one.name: one for one in comparisons(tmp_path)}
     checks = ("AtRest", "Rankine", "CoulombWedge", "MononobeOkabe", "Wood", "VeletsosYounan")
-    assert list(found) == [name + of for name in checks for of in ("", ", moment")]
+    assert [name for name in found if ", moment" not in name] == list(checks)
     assert found["Rankine"].expected == pytest.approx(
         np.tan(np.radians(28.0)) ** 2 * soil, rel=1e-9
     )

@@ -126,10 +126,10 @@ class EarthPressure(Check):
     ) -> tuple[Comparison, ...]:
         """Return the comparison of the thrust and that of its moment; of one, if one is asked for.
 
-        What both would say is said with the thrust.
+        What both would say is said with the thrust; where the formula does not apply it is all.
         """
         first = self.compare(history, facts)
-        if self.of != "thrust":
+        if self.of != "thrust" or first.applies:
             return (first,)
         second = replace(self, of="moment").compare(history, facts)
         return first, replace(
