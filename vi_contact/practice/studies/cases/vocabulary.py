@@ -290,6 +290,7 @@ def resultants(
     centre: Annotated[tuple[float, ...] | None, Unit("m")] = None,
     normal: tuple[float, ...] | None = None,
     part: Facets | str | tuple[tuple[float, ...], ...] | None = None,
+    toe: Annotated[tuple[float, ...] | None, Unit("m")] = None,
 ) -> run.Resultants:
     """Record ``Resultants``; part: the name of a [[contact]] or of a boundary group, or a box.
 
@@ -298,8 +299,9 @@ def resultants(
         centre: (d,) point of reference [m]; None: as of ``Resultants``.
         normal: (d,) direction of N towards the support; None: the mean contact direction.
         part: of the contact; None: all of it.
+        toe: (d,) point at the end over which the body would tip [m].
     """
-    return run.Resultants(name, centre, normal=normal, part=part)
+    return run.Resultants(name, centre, normal=normal, part=part, toe=toe)
 
 
 def upgoing(
