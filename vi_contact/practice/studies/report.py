@@ -131,17 +131,22 @@ def comparisons(folder: str | Path) -> tuple[Comparison, ...]:
         InputError: without a run.
     """
     folder = Path(folder)
-    table = read_copy(folder).get("check", [])
-    spot = Spot(str(folder / COPY), "", "check")
-    choices = {name: make_callee(getattr(checks, name)) for name in checks.__all__}
-    words = Words(folder, {Check: choices}, default={}, groups=(), short={})
-    value = build(read(table, Check | Sequence[Check], spot, words), {})
-    wanted = value if isinstance(value, tuple) else (value,)
+    wanted = read_checks(folder)
     if not wanted:
         return ()
     history = read_run(folder).history
     facts = ModelFacts.read(folder)
     return tuple(chain.from_iterable(check.compare_all(history, facts) for check in wanted))
+
+
+def read_checks(folder: Path) -> tuple[Check, ...]:
+    """Return the [[check]] tables of the case that a run folder keeps."""
+    table = read_copy(folder).get("check", [])
+    spot = Spot(str(folder / COPY), "", "check")
+    choices = {name: make_callee(getattr(checks, name)) for name in checks.__all__}
+    words = Words(folder, {Check: choices}, default={}, groups=(), short={})
+    value = build(read(table, Check | Sequence[Check], spot, words), {})
+    return value if isinstance(value, tuple) else (value,)
 
 
 def _describe_checks(folder: Path) -> Section:

@@ -133,7 +133,7 @@ LAYER_COLUMNS = ("t", "N_{part}", "height_{part}", "uplift_{part}", "{accelerati
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Layer(EarthPressure):
+class LayerCheck(EarthPressure):
     """Compare the largest thrust that is added to the first row's, its moment, or its height.
 
     Attributes:
@@ -185,7 +185,7 @@ class _Layer(EarthPressure):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wood(_Layer):
+class Wood(LayerCheck):
     """Expect the added thrust of a slow motion on a smooth wall, exact in plane strain.
 
     It applies below 0.3 of the layer's lowest frequency, c_s/(4 H); that of a motion is max a/(pi
@@ -236,7 +236,7 @@ class Wood(_Layer):
 
 
 @dataclass(frozen=True, kw_only=True)
-class VeletsosYounan(_Layer):
+class VeletsosYounan(LayerCheck):
     """Expect the added thrust under the whole motion.
 
     The theory leaves vertical stresses out; under slow motions it gives 3 to 6 % more than

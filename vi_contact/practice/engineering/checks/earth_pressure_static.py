@@ -14,6 +14,7 @@ from typing import Annotated, ClassVar, Self
 
 import numpy as np
 
+from ....core.algebra import Array
 from ....core.quantities import NotNegative, Unit
 from ....core.units import STANDARD_GRAVITY
 from .comparison import (
@@ -136,20 +137,38 @@ class EarthPressure(Check):
             second, notes=tuple(note for note in second.notes if note not in first.notes)
         )
 
-    def numbers(self, history: History) -> Numbers:
-        """Compare N, its moment about the foot, or its height.
+    @property
+    def laden(self) -> float:
+        """Return by what q counts on the ground of a wedge, longer or shorter than its height."""
+        slope = getattr(self, "slope", 0.0)
+        batter = getattr(self, "batter", 0.0)
+        return math.cos(batter) * math.cos(slope) / math.cos(slope - batter)
+
+    def expect(self) -> tuple[float, float, str]:
+        """Return N [N/m], its height above the foot [m], and why the theory does not apply, or "".
 
         The height is that of rho g H²/2 at H/3 and of q H, times ``laden``, at H/2.
         """
         factor, why = self.coefficient()
-        slope = getattr(self, "slope", 0.0)
-        batter = getattr(self, "batter", 0.0)
-
-        # The load on the ground of a wedge, which is longer or shorter than its height.
-        laden = math.cos(batter) * math.cos(slope) / math.cos(slope - batter)
         weight = 0.5 * self.rho * self.gravity * self.height**2
-        load = laden * self.surcharge * self.height
+        load = self.laden * self.surcharge * self.height
         arm = self.height * (weight / 3.0 + load / 2.0) / (weight + load)
+        return factor * (weight + load), arm, why
+
+    def find_pressure(self, heights: Array) -> Array:
+        """Return the normal pressure K (rho g z + q laden) [Pa], z the depth, at heights (n,) [m].
+
+        Heights count from the foot of the wall; above its top there is no pressure.
+        """
+        depth = self.height - heights
+        pressure = self.coefficient()[0] * (
+            self.rho * self.gravity * depth + self.laden * self.surcharge
+        )
+        return np.where(depth >= 0.0, pressure, 0.0)
+
+    def numbers(self, history: History) -> Numbers:
+        """Compare N, its moment about the foot, or its height."""
+        expected, arm, why = self.expect()
 
         # What the run has: the row of the largest value, or that of rest.
         thrust = history[f"N_{self.part}"] / self.width
@@ -158,7 +177,7 @@ class EarthPressure(Check):
         row = int(np.argmax(values)) if self.largest else 0
         if self.of == "height":
             return Numbers(arm, float(height[row]), why)
-        expected = factor * (weight + load) * (arm if self.of == "moment" else 1.0)
+        expected *= arm if self.of == "moment" else 1.0
         found = float(values[row])
         peak = values if self.largest and found > 0.0 else None
         notes = () if why else self.judge(found / expected)
