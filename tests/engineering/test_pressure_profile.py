@@ -70,7 +70,7 @@ def test_points_states_and_resultants() -> None:
 
 
 def test_times_and_the_foot() -> None:
-    """The step next to a time, each once; heights from another level, 1 m below the lowest point."""
+    """The step next to a time, each once; heights from a level 1 m below the lowest point."""
     found = find_profiles(run(), WALL, STEM, name="stem", times=(1.9, "max", 0.1), foot=0.0)
     assert [one.t for one in found] == [2.0, 0.0]
     assert found[1].heights.tolist() == [1.0, 2.0, 3.0, 4.0]

@@ -120,10 +120,11 @@ def _describe(report: "ProfileReport") -> list[str]:
             numbers = (width * formula.thrust, formula.height, width * formula.moment)
             lines.append(_write_row(formula.name, numbers, factors))
     for one in report.profiles:
-        shear = f"{write_number(factors[0] * one.lift)} {columns[0][1]}"
+        shear = f"{write_number(factors[0] * abs(one.lift))} {columns[0][1]}"
+        way = "upwards" if one.lift > 0.0 else "downwards"
         lines.append(
-            f"{describe_time(one)}: the soil lifts the wall with {shear}, and "
-            f"{one.open_share:.0%} of the part is open"
+            f"{describe_time(one)}: rubbed {way} with {shear}, and {one.open_share:.0%} of the "
+            "part is open"
         )
     notes = dict.fromkeys(
         [*report.notes, *(f"{one.name}: {note}" for one in report.lines for note in one.notes)]
