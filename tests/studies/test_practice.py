@@ -4,6 +4,7 @@ that certificate and ledger vouch for."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -149,6 +150,14 @@ def test_dam_has_the_resultant_of_weight_water_and_uplift(tmp_path: Path) -> Non
     assert 1.0 / (1.0 - history["margin_joint"][0]) == pytest.approx(0.75 * n / water, rel=1e-8)
     assert history["sliding_joint"][-1] - history["sliding_joint"][0] > 1e-4
     assert history["margin_joint"].min() < 1e-9
+
+    # Newmark's block has the yield coefficient of these forces.
+    (newmark,) = comparisons(tmp_path)
+    assert newmark.inputs["mu"][0] == pytest.approx((0.75 * n - water) / weight, rel=1e-8)
+    model = json.loads((tmp_path / "model.json").read_text("utf-8"))
+    assert [(part["name"], part["mu"]) for part in model["contact"]] == [("joint", 0.75)]
+    toes = json.loads((tmp_path / "columns.json").read_text("utf-8"))
+    assert "at the toe" in toes["pressure_high_joint"]["meaning"]
 
 
 @pytest.mark.promise(
