@@ -17,6 +17,7 @@ import vi_contact
 from vi_contact.core.errors import InputError
 from vi_contact.practice.cli.entry import main
 from vi_contact.practice.studies import comparisons, read_case
+from vi_contact.practice.studies.report import remarks
 
 pytestmark = pytest.mark.serial
 LAYER = """
@@ -82,6 +83,9 @@ def test_checks_of_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert "AtRest, moment: expected 1111.1, found " in said and said.count("K0 = ν/(1-ν)") == 1
     assert "AtRest; AtRest, moment: the ratio is found over expected, and no judgement" in said
     assert "K0 = ν/(1-ν)" in said
+    # the report says the same, once for both
+    (told,) = (sentence for sentence in remarks((rest, moment, active)) if "below 1" in sentence)
+    assert told.startswith("AtRest; AtRest, moment: the ratio is found over expected")
     assert "Rankine: does not apply: the ground is steeper" in said and "nu = 0.25 -" in said
     assert (out / "checks.csv").read_text(encoding="utf-8").count("\n") == 4
 

@@ -9,9 +9,11 @@ import pytest
 
 pytest.importorskip("dolfinx")
 
+from kept_figures import keep_figures
 from mpi4py import MPI
 
 from vi_contact.practice.cli.entry import main
+from vi_contact.practice.plots import pressure_profile
 from vi_contact.practice.studies import read_case
 
 pytestmark = pytest.mark.serial
@@ -97,9 +99,12 @@ def read_table(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def test_the_pressure_at_rest(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_pressure_at_rest(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """K0 rho g z at nodes inside, that of the cell's middle at the ends. The thrust is 30 kN/m,
     at H/3 + h²/(6 H) = 1.0139 m; Mononobe and Okabe's 90 kN/m times K(30°, kh 0.2) = 0.4732."""
+    figures = keep_figures(monkeypatch, pressure_profile)
     assert main(["post", "profile", str(folder), "stem"]) == 0
     said = capsys.readouterr().out.splitlines()
     rows = [row for row in read_table(folder / "profile.csv") if row["t_s"] == "0"]
@@ -116,7 +121,18 @@ def test_the_pressure_at_rest(folder: Path, capsys: pytest.CaptureFixture[str]) 
     assert rest.split()[-3:] == ["30", "1", "30"]
     assert shaken.split()[-3:] == ["42.59", "1", "42.59"]
     assert "Coulomb: does not apply: phi - slope - psi is below zero" in "\n".join(said)
-    assert (folder / "profile.png").stat().st_size > 10_000
+
+    # The picture has the run and the two formulas that apply, in kPa, on axes with names.
+    (axis,) = figures[0].axes
+    lines = {line.get_label(): line for line in axis.lines}
+    assert {"at rest", "Mononobe–Okabe, kh = 0.2", "run, t = 0 s"} <= set(lines)
+    assert "Coulomb" not in lines
+    assert lines["at rest"].get_xdata()[0] == pytest.approx(20.0, rel=1e-9)
+    assert lines["run, t = 0 s"].get_xdata()[1] == pytest.approx(20.0 * 2.5 / 3.0, rel=1e-7)
+    assert axis.get_xlabel() == "normal pressure [kPa]"
+    assert axis.get_ylabel() == "height above the foot [m]"
+    assert lines["at rest"].get_linestyle() != lines["Mononobe–Okabe, kh = 0.2"].get_linestyle()
+    assert (folder / "profile.png").is_file()
 
 
 def test_a_box_of_resultants(folder: Path, tmp_path: Path) -> None:

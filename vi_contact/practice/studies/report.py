@@ -3,6 +3,7 @@
 It says what its folder holds, the checks that the case asks for, and its discretisation.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
@@ -158,16 +159,20 @@ def _describe_checks(folder: Path) -> Section:
 
 
 def remarks(results: Sequence[Comparison]) -> list[str]:
-    """Return what is to be said of comparisons: what ratios mean, and the notes of each.
+    """Return what is to be said of comparisons: how long peaks last, what ratios mean, all notes.
 
     What several of them say is said once, with their names.
     """
     names: dict[str, list[str]] = {}
     for result in results:
-        sentences = [*([result.reading] if result.reading else []), *result.notes]
+        sentences = list(result.notes)
+        if math.isfinite(result.lasted):
+            sentences.append(f"the run is above 90 % of its peak for {result.lasted:.3g} s")
+        if result.reading and not result.applies:
+            sentences.append(result.reading)
         for sentence in sentences:
             names.setdefault(sentence, []).append(result.name)
-    return [f"{', '.join(owners)}: {sentence}." for sentence, owners in names.items()]
+    return [f"{'; '.join(owners)}: {sentence}." for sentence, owners in names.items()]
 
 
 def _describe_comparison(comparison: Comparison) -> list[str]:

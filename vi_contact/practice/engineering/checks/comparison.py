@@ -146,6 +146,11 @@ class Check(ABC):
         The history has all columns that the formula reads.
         """
 
+    @property
+    def reading(self) -> str:
+        """Return what a ratio above or below 1 means, and which side is unsafe."""
+        return self.formula.reading
+
     def settle(self, history: History, facts: ModelFacts) -> tuple[Self, list[str]]:
         """Return the check with what it takes from the run, and sentences about that.
 
@@ -215,7 +220,7 @@ class Check(ABC):
             found=numbers.found,
             unit=self.formula.answers[self.of],
             applies=numbers.why,
-            reading=self.formula.reading,
+            reading=check.reading,
             lasted=lasted,
             notes=(*notes, *numbers.notes),
         )

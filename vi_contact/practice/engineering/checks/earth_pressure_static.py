@@ -79,6 +79,10 @@ YIELDED = (
     f"{NO_JUDGEMENT}: below 1 the run presses less than yielding soil, which is unsafe; above 1 it "
     "presses more, as elastic soil does"
 )
+PUSHED_UP = (
+    f"{NO_JUDGEMENT}: above 1 the run presses more than soil bears before it is pushed up, which "
+    "is unsafe"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,6 +140,11 @@ class EarthPressure(Check):
         return first, replace(
             second, notes=tuple(note for note in second.notes if note not in first.notes)
         )
+
+    @property
+    def reading(self) -> str:
+        """Return what the ratio means: of passive pressure the other side is unsafe."""
+        return PUSHED_UP if getattr(self, "passive", False) else self.formula.reading
 
     @property
     def laden(self) -> float:
