@@ -1,4 +1,4 @@
-"""What checks take from a run, what they tell of it, and moments, by hand."""
+"""S4.8: What checks take from a run, what they tell of it, and moments, by hand."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The pressure on a wall over its height, by hand: points, states, resultants, formulas."""
+"""S4.8: The pressure on a wall over its height, by hand: points, states, resultants, formulas."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Coefficients of friction of their own for each [[contact]], against blocks that slide by hand."""
+"""S4.9: Friction of its own for each [[contact]], against blocks that slide by hand."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``vi-contact post profile`` on a layer at rest, whose pressures are known exactly."""
+"""S4.8: ``vi-contact post profile`` on a layer at rest, whose pressures are known exactly."""
 
 from __future__ import annotations
 
