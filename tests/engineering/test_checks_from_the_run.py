@@ -118,6 +118,7 @@ def test_how_long_a_peak_lasts() -> None:
     assert not any("one step" in note for note in told.notes)
 
 
+@pytest.mark.promise("guide/checks.md", "differs from that of the run by more than 3 % is told")
 def test_kh_is_the_peak_of_the_run() -> None:
     """2.5 m/s² of 10 m/s², to either side, or that of the surface; typed otherwise it is told."""
     given = {**WALL, "phi": THIRTY, "part": "stem"}

@@ -129,6 +129,7 @@ def record(
     return record if processing is None else processing(record)
 
 
+@check_arguments
 def surface(
     system: SemiDiscreteSystem,
     facets: Facets,
@@ -168,6 +169,7 @@ def surface(
     return result.bilateral_everywhere() if held else result
 
 
+@check_arguments
 def pair(
     system: SemiDiscreteSystem,
     facets1: Facets,
