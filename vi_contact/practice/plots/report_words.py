@@ -86,7 +86,7 @@ HEADERS = {
         "expected",
         "found",
         "unit",
-        "found / expected",
+        "ratio",
         "source",
     ),
 }

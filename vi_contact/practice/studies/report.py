@@ -3,8 +3,10 @@
 It says what its folder holds, the checks that the case asks for, and its discretisation.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ from ...run.files.folder import MODEL
 from ...run.files.reading import read_object, read_run
 from ..engineering import checks
 from ..engineering.checks.comparison import Check, Comparison
+from ..engineering.checks.model_facts import ModelFacts
 from ..engineering.peak_values import peaks, write_peaks
 from ..plots.bodies import draw_run
 from ..plots.histories import render_image
@@ -121,27 +124,55 @@ def _draw_model(folder: Path, picture: Path) -> tuple[dict[str, Any], list[Path]
 
 @check_arguments
 def comparisons(folder: str | Path) -> tuple[Comparison, ...]:
-    """Return the comparisons of a run folder, one for each [[check]] of the case it keeps.
+    """Return the comparisons of a run folder, of each [[check]] of the case it keeps.
+
+    An earth pressure has two: of the thrust, and of its moment about the foot.
 
     Raises:
         InputError: without a run.
     """
     folder = Path(folder)
+    wanted = read_checks(folder)
+    if not wanted:
+        return ()
+    history = read_run(folder).history
+    facts = ModelFacts.read(folder)
+    return tuple(chain.from_iterable(check.compare_all(history, facts) for check in wanted))
+
+
+def read_checks(folder: Path) -> tuple[Check, ...]:
+    """Return the [[check]] tables of the case that a run folder keeps."""
     table = read_copy(folder).get("check", [])
     spot = Spot(str(folder / COPY), "", "check")
     choices = {name: make_callee(getattr(checks, name)) for name in checks.__all__}
     words = Words(folder, {Check: choices}, default={}, groups=(), short={})
     value = build(read(table, Check | Sequence[Check], spot, words), {})
-    wanted = value if isinstance(value, tuple) else (value,)
-    history = read_run(folder).history if wanted else {}
-    return tuple(check.compare(history) for check in wanted)
+    return value if isinstance(value, tuple) else (value,)
 
 
 def _describe_checks(folder: Path) -> Section:
     """Return what the run found beside the formulas that its case names."""
-    rows = [_describe_comparison(comparison) for comparison in comparisons(folder)]
+    results = comparisons(folder)
+    rows = [_describe_comparison(comparison) for comparison in results]
     tables = [Table(HEADERS["checks"], rows)] if rows else []
-    return Section("Checks against formulas", tables=tables)
+    return Section("Checks against formulas", sentences=remarks(results), tables=tables)
+
+
+def remarks(results: Sequence[Comparison]) -> list[str]:
+    """Return what is to be said of comparisons: how long peaks last, what ratios mean, all notes.
+
+    What several of them say is said once, with their names.
+    """
+    names: dict[str, list[str]] = {}
+    for result in results:
+        sentences = list(result.notes)
+        if math.isfinite(result.lasted):
+            sentences.append(f"the run is above 90 % of its peak for {result.lasted:.3g} s")
+        if result.reading and not result.applies:
+            sentences.append(result.reading)
+        for sentence in sentences:
+            names.setdefault(sentence, []).append(result.name)
+    return [f"{'; '.join(owners)}: {sentence}." for sentence, owners in names.items()]
 
 
 def _describe_comparison(comparison: Comparison) -> list[str]:

@@ -316,6 +316,11 @@ def _refuse_beside_layer(path: Path, tables: Mapping[str, Any]) -> None:
                     f"{path}: [[contact]] has {key}, and [layer] is a law of rigid obstacles from "
                     "which a body may part: leave one of the two out"
                 )
+        if isinstance(table, dict) and "mu" in table:
+            raise InputError(
+                f"{path}: [[contact]] has mu, and [layer] is a law without friction: leave one of "
+                "the two out"
+            )
 
 
 def refuse_ranks(path: Path, body: str, size: int) -> None:

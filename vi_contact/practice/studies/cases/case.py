@@ -59,6 +59,7 @@ from .bodies import (
     refuse_ranks,
 )
 from .expressions import check_axes
+from .friction_of_tables import join_laws, list_contacts, list_laws
 from .library import check_format, find_base_folder, keep_copy, refuse_case_of_others
 from .own_classes import check_packages
 from .parsing import Words, read, read_arguments, suggest_nearest
@@ -148,6 +149,7 @@ class Case:
         for table, node in self.nodes.items():
             if table not in need_mesh and not needs_body(node):
                 self._build_table(table)
+        self.list_friction()
         if not needs_body(self.nodes["run"]):
             self._check_steps(self._build_table("run"))
         if self.body is not None:
@@ -373,6 +375,14 @@ class Case:
         friction: FrictionLaw | None = self._build_table("friction") if slides else None
         return friction or Frictionless()
 
+    def list_friction(self) -> list[FrictionLaw]:
+        """Return the law of friction of each [[contact]].
+
+        Raises:
+            InputError: the mu of a table does not go with [friction].
+        """
+        return list_laws(self._build_friction(), list_contacts(self.nodes.get("contact", ())))
+
     def _build_body_problem(self, body: Body) -> ContactProblem:
         """Return the problem of a body without a mesh, before its excitations."""
         try:
@@ -452,7 +462,11 @@ class Case:
         return ContactProblem(
             parts.system,
             parts.surface,
-            friction=self._build_friction(),
+            friction=join_laws(
+                self._build_friction(),
+                list_contacts(self.nodes.get("contact", ())),
+                parts.surface,
+            ),
             impact=self._build_table("impact"),
             mass=self._build_table("mass") or parts.mass,
             excitation=() if parts.moved else self.excitations(system=parts.system),

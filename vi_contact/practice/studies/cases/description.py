@@ -27,6 +27,7 @@ from ....run.time_steps import StepPlan
 from ...ground_motion.excitation import GroundMotion
 from ...ground_motion.record import Record
 from .bodies import Body
+from .friction_of_tables import find_mu
 from .table_calls import Call, Group, build, walk_nodes
 from .unread_choices import find_left_over
 from .vocabulary import Parts
@@ -155,9 +156,9 @@ def describe(
         - groups: name, kind;
         - bodies: name, cells, mass [kg], material;
         - supports: kind, groups, components;
-        - contact: name, points, size [m²], friction, nodes: a sentence, places, others: kind ->
-          places, sides: name, h [m] and G [Pa] of both; of a body without mesh gap [m] in the place
-          of a size;
+        - contact: name, points, size [m²], friction, mu: of Coulomb's law, nodes: a sentence,
+          places, others: kind -> places, sides: name, h [m] and G [Pa] of both; of a body without
+          mesh gap [m] in the place of a size;
         - layers: width [m], speed [m/s], passage: their quotient [s];
         - periods [s], damping_ratios of their modes and rigid_motions with the contact closed where
           it touches at the start, and sticking where there is friction; periods_open, the first one
@@ -371,6 +372,7 @@ def _describe_contact(
     whole = surface.whole()
     parts = getattr(surface, "parts", ())
     ends = np.cumsum([0, *(round(total(surface.comm, len(part.slots))) for part in parts)])
+    laws = case.list_friction()
     for number, (node, (a, b)) in enumerate(zip(nodes, pairwise(ends), strict=True)):
         groups = [inner.name for inner in walk_nodes(node) if isinstance(inner, Group)]
         census = surface.censuses[number] if len(surface.censuses) == len(parts) else None
@@ -378,7 +380,8 @@ def _describe_contact(
             "name": node.arguments.get("name") or " on ".join(groups),
             "points": int(b - a),
             "size": float(whole.weights[a:b].sum()),
-            "friction": repr(problem.friction),
+            "friction": repr(laws[number]),
+            "mu": find_mu(laws[number]),
             "nodes": "" if census is None else census.in_words(),
             "places": whole.points[a:b],
             "others": {} if census is None else census.places,

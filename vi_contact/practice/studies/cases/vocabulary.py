@@ -27,7 +27,7 @@ from ....core import (
 )
 from ....core.arguments import check_arguments
 from ....core.corners import FEATURE_ANGLE
-from ....core.quantities import RATIO, Positive, Unit
+from ....core.quantities import RATIO, NotNegative, Positive, Unit
 from ....core.system import SemiDiscreteSystem
 from ....core.units import STANDARD_GRAVITY
 from ....fem import (
@@ -91,6 +91,10 @@ _KINDS: Mapping[ModuleType, tuple[Any, ...]] = {  # room -> the kinds of things 
 }
 
 
+# of a table [[contact]]: ``friction_of_tables`` reads it
+FrictionCoefficient = Annotated[float, NotNegative, RATIO]
+
+
 @dataclass(frozen=True)
 class MeshFile:
     """Hold what [mesh] makes of type = "read_mesh": the path of a file for ``fem.read_mesh``."""
@@ -125,6 +129,7 @@ def record(
     return record if processing is None else processing(record)
 
 
+@check_arguments
 def surface(
     system: SemiDiscreteSystem,
     facets: Facets,
@@ -136,6 +141,7 @@ def surface(
     springs: Annotated[float | None, Unit("Pa/m")] = None,
     frictionless_corners: bool = False,
     hinges: bool = False,
+    mu: FrictionCoefficient | None = None,
     name: str = "",
 ) -> ContactSurface:
     """Make a ``contact_surface``.
@@ -150,6 +156,7 @@ def surface(
         springs: foundation modulus [Pa/m] of the springs on which it rests; None: without.
         frictionless_corners: whether nodes with several conditions slide freely over their faces.
         hinges: whether the body may hang together with another one by nodes of this boundary.
+        mu: coefficient of friction of this surface; None: that of [friction].
         name: of the surface, as ``part`` of recorders.
     """
     result = fem.contact_surface(
@@ -162,6 +169,7 @@ def surface(
     return result.bilateral_everywhere() if held else result
 
 
+@check_arguments
 def pair(
     system: SemiDiscreteSystem,
     facets1: Facets,
@@ -173,6 +181,7 @@ def pair(
     held: bool = False,
     frictionless_corners: bool = False,
     hinges: bool = False,
+    mu: FrictionCoefficient | None = None,
     name: str = "",
 ) -> ContactSurface:
     """Make a ``contact_pair``; held: ``.bilateral_everywhere()``; the others: as of ``surface``.
@@ -187,6 +196,7 @@ def pair(
         held: as of ``surface``.
         frictionless_corners: as of ``surface``.
         hinges: as of ``surface``.
+        mu: as of ``surface``.
         name: as of ``surface``.
     """
     result = fem.contact_pair(
@@ -282,6 +292,7 @@ def resultants(
     centre: Annotated[tuple[float, ...] | None, Unit("m")] = None,
     normal: tuple[float, ...] | None = None,
     part: Facets | str | tuple[tuple[float, ...], ...] | None = None,
+    toe: Annotated[tuple[float, ...] | None, Unit("m")] = None,
 ) -> run.Resultants:
     """Record ``Resultants``; part: the name of a [[contact]] or of a boundary group, or a box.
 
@@ -290,8 +301,9 @@ def resultants(
         centre: (d,) point of reference [m]; None: as of ``Resultants``.
         normal: (d,) direction of N towards the support; None: the mean contact direction.
         part: of the contact; None: all of it.
+        toe: (d,) point at the end over which the body would tip [m].
     """
-    return run.Resultants(name, centre, normal=normal, part=part)
+    return run.Resultants(name, centre, normal=normal, part=part, toe=toe)
 
 
 def upgoing(
