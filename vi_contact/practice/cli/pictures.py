@@ -1,13 +1,14 @@
 """``vi-contact report``, ``plot`` and ``film``: options and what the commands do."""
 
 import argparse
+import time
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...core.checks import quote
 from ...core.errors import InputError
-from .errors import world
+from .errors import say, world
 from .options import add_command, add_folder, output_file
 
 if TYPE_CHECKING:
@@ -55,6 +56,14 @@ def _add_report(commands: Any) -> None:
         ),
     )
     report.add_argument(
+        "--halved",
+        action="store_true",
+        help=(
+            "run the case again with half the time step, into DIR/refined/dt, and say how far "
+            "the numbers that decide change"
+        ),
+    )
+    report.add_argument(
         "--refine",
         action="store_true",
         help=(
@@ -67,7 +76,7 @@ def _add_report(commands: Any) -> None:
         action="append",
         default=[],
         metavar="PACKAGE",
-        help="the option of 'vi-contact run', for the runs of --refine",
+        help="the option of 'vi-contact run', for the runs of --halved and --refine",
     )
     add_folder(report)
 
@@ -159,23 +168,31 @@ def _report(options: argparse.Namespace) -> str:
         import mpi4py.MPI  # noqa: F401  # first: ``world`` finds it
 
     from ..plots.web_page import MISSING, can_write
-    from ..studies.refinement import refine
+    from ..studies.refinement import estimate_cost, refine, write_seconds
     from ..studies.report import report
 
     comm = world()
     if options.out is not None:
         output_file(options.out)
-    failed = refine(options.folder, comm, allow=options.allow) if options.refine else None
+    halved = ("h", "dt") if options.refine else ("dt",) if options.halved else ()
+    failed = None
+    if halved:
+        cost = estimate_cost(options.folder, halved)
+        if comm.rank == 0:
+            say(cost)
+        failed = refine(options.folder, comm, names=halved, allow=options.allow)
     if comm.rank != 0:
         return ""
+    begin = time.perf_counter()
     columns = None if options.show is None else [group.split(",") for group in options.show]
     refinement, paths = report(
         options.folder, out=options.out, title=options.title, columns=columns, failed=failed
     )
-    lines = _format_refinement(refinement) if options.refine else []
+    lines = _format_refinement(refinement) if halved else []
     lines += map(str, paths)
     if options.out is None and not can_write():
         lines.append(f"no report.html: {MISSING}")
+    lines.append(f"report written in {write_seconds(time.perf_counter() - begin)}")
     return "\n".join(lines)
 
 

@@ -3,7 +3,7 @@
 ``sections`` fills in the numbers.
 """
 
-# What the report says first: name -> text with entries of summary.json.
+# What the report says of the method: name -> text with entries of summary.json.
 SUMMARY = {
     "scheme": "{scheme}",
     "mass": "{mass}",
@@ -67,6 +67,7 @@ MODEL_FACTS = {
 }
 # Heads of tables.
 HEADERS = {
+    "method": ("method and outcome", ""),
     "results": (
         "result",
         "column",
@@ -93,13 +94,13 @@ HEADERS = {
 # Sentences; numbers stand for {names}.
 SAY = {
     "untried": (
-        "The discretisation error was not measured: `vi-contact report DIR --refine` "
-        "repeats the run with half the element size and with half the time step, and "
-        "prints what changes."
+        "The discretisation error was not measured: `vi-contact report DIR --halved` "
+        "repeats the run with half the time step, `--refine` with half the element size too, "
+        "and the report says what changes."
     ),
     "refined": (
-        "The table has the largest size of every column in this run, and in runs with half "
-        "the element size (h/2) and with half the time step (dt/2). If the error falls "
+        "The table has the largest size of every column in this run, and in runs with {finer}. "
+        "If the error falls "
         "with the first power of h or dt, the error of this run is twice the difference; "
         "if it falls with the second power, it is 4/3 of the difference."
     ),
@@ -120,8 +121,7 @@ SAY = {
         "shift, {corner:.3g} Hz). When contact closes, a velocity jumps, and the raw "
         "acceleration of that step is the jump divided by the time step: it grows without "
         "limit as the time step is made shorter. Raw peak accelerations at impacts are not "
-        "convergent. Displacements, forces and accelerations below the corner frequency "
-        "are convergent."
+        "convergent."
     ),
     "certificate": (
         "Every one of the {steps} steps has a certificate: the largest residual of its "

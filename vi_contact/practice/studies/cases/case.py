@@ -9,6 +9,7 @@ interface.
 [[contact]]       fem.contact_surface, .contact_pair   [gravity]  with_weight, static_equilibrium
 [friction] [impact] [mass] [[excitation]]              [[check]]  to compare with engineering.checks
 [[stage]]  what replaces these tables in stages that follow one another
+[sheet]            whose the report is, which numbers decide in it, and its units
 [beam] [particle]  bodies and their contact, in place of [mesh] and the tables that belong to it
 [layer]            layer.contact_layer, in place of [friction], [impact] and [scheme]
 """
@@ -49,6 +50,7 @@ from ....run.recorders.steps import Steps
 from ....run.simulate import Solution, simulate
 from ....run.time_steps import StepPlan, plan_steps
 from ...engineering.checks.comparison import Check
+from ...sheet.choices import Sheet, refuse_unknown_numbers
 from .bodies import (
     BeamBody,
     Body,
@@ -101,6 +103,7 @@ TABLES: dict[str, Any] = {
     "record": Recorder | Sequence[Recorder],
     "fields": FieldWriter,
     "check": Check | Sequence[Check],
+    "sheet": make_callee(Sheet),
 }
 
 
@@ -189,6 +192,9 @@ class Case:
         """Return the columns that a run writes into history.csv; computes no step.
 
         ``parts`` as above. Collective.
+
+        Raises:
+            InputError: for numbers of [sheet] that are none of them.
         """
         parts = parts or self.parts(comm)
         problem = self._build_problem(parts)
@@ -197,12 +203,17 @@ class Case:
             recorders = (Energy(), Contact())
         problem, _ = with_defaults(problem, self._build_scheme())
         state = initial_state(problem)
-        return frozenset(
+        columns = frozenset(
             name
             for recorder in (Steps(), *recorders)
             for name, value in recorder.start(problem, state).items()
             if np.ndim(value) == 0
         )
+        try:
+            refuse_unknown_numbers(self.sheet, columns)
+        except InputError as error:
+            raise self.nodes["sheet"].spot.make_table_error(f"{error}") from error
+        return columns
 
     def _build_recorders(self, parts: Parts) -> tuple[Recorder, ...] | None:
         """Return the recorders of [[record]]; None for those of ``simulate``."""
@@ -245,6 +256,10 @@ class Case:
         # before any work; ``simulate`` looks once more, with the folder's lock
         if folder is not None:
             on_root(MpiComm(comm), partial(self._refuse_files_of_others, folder))
+        parts = None
+        if self.sheet.numbers is not None:  # a number that the run does not have is told before it
+            parts = self.parts(comm)
+            self.columns(comm, parts)
         if "strain_compatible" in self.nodes:
             return iterate(
                 self, comm, folder, restart=restart, progress=progress, wall_time=wall_time
@@ -260,7 +275,7 @@ class Case:
                 changed=changed,
                 wall_time=wall_time,
             )
-        parts = self.parts(comm)
+        parts = parts or self.parts(comm)
         with self.call(parts, folder) as call:
             self.keep_model(comm, parts, folder)
             return simulate(
@@ -351,6 +366,11 @@ class Case:
         table = find_body_table(self.nodes)
         body: Body | None = self._build_table(table) if table else None
         return body
+
+    @cached_property
+    def sheet(self) -> Sheet:
+        """Return what [sheet] says of the report."""
+        return self._build_table("sheet") or Sheet()
 
     @cached_property
     def layer(self) -> "ContactLayer | None":
