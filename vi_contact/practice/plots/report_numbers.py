@@ -28,6 +28,9 @@ class ReportNumbers:
         """Return (factor from the SI unit, name of the unit) for a column of this unit."""
         if unit == "-" and column.startswith(_SHARES):
             return PERCENT
+        if unit in ("N/m", "N m/m"):  # those of a metre already
+            factor, name = choose_unit(unit.removesuffix("/m"), self.units)
+            return factor, f"{name}/m"
         quantity = "size" if unit == "m" and column.startswith(_PLACES) else ""
         return choose_unit(
             unit, self.units, quantity=quantity, slice_thickness=self.slice_thickness

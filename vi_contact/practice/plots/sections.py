@@ -34,6 +34,8 @@ from .report_words import (
 )
 
 NOT_SHOWN = ("places", "others", "sides")  # of what model.json tells of a contact
+# What of a part that stands upright says nothing: its thrust has a height in place of e.
+FOR_LEVEL_PARTS = ("e", "theta", "settlement")
 NOISE = 1e-6  # of the largest number in the same unit: what is smaller is rounding
 FEW_ROWS = 20  # of a history: accelerations of a run with no more are not filtered
 
@@ -225,6 +227,10 @@ def _list_results(
             continue  # such as the height of the thrust on a level part
         kind, _, part = name.partition("_")
 
+        is_upright = np.isfinite(run.history.get(f"level_{part}", np.nan)).any()
+        if kind in FOR_LEVEL_PARTS and is_upright:
+            continue
+
         # When the result is largest in size; heights count where they are numbers.
         thrust = run.history.get(f"N_{part}") if kind in ("height", "level") else None
         row = int(np.nanargmax(np.abs(values) if thrust is None else thrust + 0.0 * values))
@@ -351,9 +357,7 @@ def _tabulate_peaks(run: RunFolder, numbers: ReportNumbers) -> Section:
 
 
 def header_facts(run: RunFolder) -> list[tuple[str, str]]:
-    """Return (name, value) of the method of a run and of its outcome; a dash for what is unknown.
-
-    """
+    """Return (name, value) of the method of a run and of its outcome; a dash where unknown."""
     t = run.history["t"]
     facts = {key: value for key, value in run.facts.items() if value is not None}
     facts |= {

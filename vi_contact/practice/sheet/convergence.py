@@ -58,7 +58,9 @@ def compare(
             continue
         changes[name] = []
         for number in numbers:
-            scale = scales[run.columns[number.column][0]]
+            unit = run.columns[number.column][0]
+            # shares and factors have no unit in common
+            scale = abs(number.value) if unit == "-" else scales[unit]
             changes[name].append(_find_change(number, refined[name], scale))
     return changes
 

@@ -38,6 +38,11 @@ class DecidingNumber:
     rule: str = ""
 
     @property
+    def short_name(self) -> str:
+        """Return the name in a sentence: that of a rule, or the column."""
+        return self.name if self.rule else self.column
+
+    @property
     def is_brief(self) -> bool:
         """Say whether it is a peak of one step."""
         return self.steps == 1
@@ -70,9 +75,7 @@ def measure_again(number: DecidingNumber, history: History) -> DecidingNumber | 
     """Return the same number of another run of the case; None where it has no such column."""
     if number.column not in history:
         return None
-    return measure_column(
-        number.name, number.column, number.measure, history, rule=number.rule
-    )
+    return measure_column(number.name, number.column, number.measure, history, rule=number.rule)
 
 
 def _apply_rule(word: str, history: History) -> DecidingNumber:

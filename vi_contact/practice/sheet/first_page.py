@@ -18,6 +18,7 @@ from .deciding import NEARLY, DecidingNumber, Measure, choose_numbers
 
 LONGEST = 300  # letters of a text of the title block
 UNKNOWN = "-"
+TOGETHER = "\N{NO-BREAK SPACE}"  # between a number and its unit
 _HEADER = ("number", "column", "value", "at t", f"lasts above {100 * NEARLY:.0f} %")
 
 
@@ -113,7 +114,8 @@ def _write_number(number: DecidingNumber, run: RunFolder, numbers: ReportNumbers
         value = numbers.write(number.value, number.column, unit)
     at = UNKNOWN if np.isnan(number.t) else f"{write_number(number.t)} s"
     name = shorten(number.name, 80, placeholder=" …")
-    return [name, number.column, str(value), at, _write_duration(number)]
+    cells = [str(value), at, _write_duration(number)]
+    return [name, number.column, *(cell.replace(" ", TOGETHER) for cell in cells)]
 
 
 def _write_duration(number: DecidingNumber) -> str:
@@ -176,7 +178,7 @@ def _explain_convergence(
             "twice its change."
         )
     open_ones = [
-        number.name
+        number.short_name
         for place, number in enumerate(deciding)
         if any(not changes[name][place].is_converged for name in refined)
     ]
@@ -195,7 +197,7 @@ def _explain_brief_peaks(
     brief = [place for place, number in enumerate(deciding) if number.is_brief]
     if not brief:
         return []
-    names = ", ".join(deciding[place].name for place in brief)
+    names = ", ".join(deciding[place].short_name for place in brief)
     untested = any(changes["dt"][place].text == NOT_TESTED for place in brief)
     remedy = "test it with `--halved`" if untested else "see the column of dt/2"
     return [

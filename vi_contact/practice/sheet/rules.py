@@ -235,4 +235,3 @@ def _choose_parts(where: Where, history: History) -> list[str]:
     # A part that stands upright has a height, and so its thrust a level.
     upright = [part for part in parts if not np.isnan(history[f"level_{part}"]).all()]
     return [part for part in upright if part != base] or upright
-

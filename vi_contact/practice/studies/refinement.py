@@ -98,20 +98,27 @@ def estimate_cost(folder: str | Path, names: Sequence[str]) -> str:
         InputError: as of ``refine``.
     """
     run = _read_finished(folder)
-    seconds = run.facts.get("seconds")
-    known = isinstance(seconds, int | float) and not isinstance(seconds, bool)
+    seconds = _read_seconds(run)
     phrases = []
     for name in names:
         if _find_refined(run, name) is not None:
             phrases.append(f"{NAMES[name]} has run already")
-        elif known:
+        elif seconds is not None:
             times = 2.0 if name == "dt" else 2.0 ** _read_dimension(run)
             least = "about" if name == "dt" else "at least"
             phrases.append(f"{NAMES[name]} will take {least} {write_seconds(times * seconds)}")
         else:
             phrases.append(f"how long {NAMES[name]} will take is unknown")
-    took = f"the run took {write_seconds(seconds)}; " if known else ""
+    took = "" if seconds is None else f"the run took {write_seconds(seconds)}; "
     return took + ", ".join(phrases)
+
+
+def _read_seconds(run: RunFolder) -> float | None:
+    """Return how long a run took [s]; None where nothing tells it."""
+    seconds = run.facts.get("seconds")
+    if isinstance(seconds, bool) or not isinstance(seconds, int | float):
+        return None
+    return float(seconds)
 
 
 def write_seconds(seconds: float) -> str:
