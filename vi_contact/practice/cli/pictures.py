@@ -169,7 +169,7 @@ def _report(options: argparse.Namespace) -> str:
 
     from ..plots.web_page import MISSING, can_write
     from ..studies.refinement import estimate_cost, refine, write_seconds
-    from ..studies.report import report
+    from ..studies.report import write_report
 
     comm = world()
     if options.out is not None:
@@ -185,24 +185,28 @@ def _report(options: argparse.Namespace) -> str:
         return ""
     begin = time.perf_counter()
     columns = None if options.show is None else [group.split(",") for group in options.show]
-    refinement, paths = report(
+    written = write_report(
         options.folder, out=options.out, title=options.title, columns=columns, failed=failed
     )
-    lines = _format_refinement(refinement) if halved else []
-    lines += map(str, paths)
+    lines = _format_tables(written.first) if halved else []
+    lines += _format_tables(written.error) if options.refine else []
+    lines += map(str, written.paths)
     if options.out is None and not can_write():
         lines.append(f"no report.html: {MISSING}")
     lines.append(f"report written in {write_seconds(time.perf_counter() - begin)}")
     return "\n".join(lines)
 
 
-def _format_refinement(section: "Section") -> list[str]:
-    """Return the lines about the discretisation error: sentences, and tables in columns."""
+def _format_tables(section: "Section") -> list[str]:
+    """Return the lines of a section: sentences, tables in columns, and notes."""
     lines = [*section.sentences]
     for table in section.tables:
-        for first, *others in (table.header, *table.rows):
-            lines.append(f"{first:<48}" + "".join(f"{cell:>13}" for cell in others))
-    return lines
+        rows = [table.header, *table.rows]
+        widths = [2 + max(map(len, column)) for column in zip(*rows, strict=True)]
+        for row in rows:
+            cells = [cell.ljust(width) for cell, width in zip(row, widths, strict=True)]
+            lines.append("".join(cells).rstrip())
+    return [*lines, *section.notes]
 
 
 def _plot(options: argparse.Namespace) -> str:

@@ -245,9 +245,9 @@ def find_scales(run: RunFolder) -> dict[str, float]:
     What is smaller than ``NOISE`` of it is rounding.
     """
     scales: dict[str, float] = defaultdict(float)
-    for name, values in run.history.items():
+    for name, (unit, _) in run.columns.items():
+        values = run.history.get(name, np.array([]))
         if values.ndim == 1 and not np.isnan(values).all():
-            unit = run.columns[name][0]
             scales[unit] = max(scales[unit], float(np.nanmax(np.abs(values))))
     return scales
 

@@ -1,6 +1,7 @@
 """Draw a model from what model.json says of it: outline, supports and the parts of the contact."""
 
 from collections.abc import Mapping, Sequence
+from textwrap import shorten
 from typing import Any
 
 import numpy as np
@@ -87,7 +88,7 @@ def _name_materials(axis: Any, bodies: Sequence[Mapping[str, Any]], d: int) -> N
         if isinstance(numbers.get("rho"), float):
             words.append(f"{write_number(numbers['rho'])} kg/m³")
         label = f"{body.get('name')}: {', '.join(words) or numbers.get('type', '-')}"
-        axis.plot(*nowhere, ls="", label=escape_dollars(label))
+        axis.plot(*nowhere, ls="", label=escape_dollars(shorten(label, 60, placeholder=" …")))
 
 
 def _draw_dimensions(axis: Any, low: Array, high: Array) -> None:

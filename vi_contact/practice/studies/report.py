@@ -4,7 +4,7 @@ It says what its folder holds, the checks that the case asks for, and its discre
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +64,34 @@ def report(
         InputError: as of ``read_run``, for a run of one row, columns that do not exist, another
             kind of file, .html without jinja2 and plotly, and a damaged model.json.
     """
+    written = write_report(folder, out=out, title=title, columns=columns, failed=failed)
+    return written.error, written.paths
+
+
+@dataclass(frozen=True)
+class WrittenReport:
+    """Hold what a report says first, and where it is.
+
+    Attributes:
+        first: page 1, the numbers that decide.
+        error: what it says of the discretisation error.
+        paths: of the files.
+    """
+
+    first: Section
+    error: Section
+    paths: list[Path]
+
+
+def write_report(
+    folder: str | Path,
+    *,
+    out: str | Path | None = None,
+    title: str | None = None,
+    columns: Sequence[Sequence[str]] | None = None,
+    failed: Mapping[str, str] | None = None,
+) -> WrittenReport:
+    """Write the report on a run folder; arguments and errors as of ``report``."""
     folder = Path(folder)
     case = read_copy(folder)
     run = read_run(folder)
@@ -105,7 +133,7 @@ def report(
         write = WRITERS[page.suffix.lower()]
         write(page, heading, facts, [first, *told], f"vi_contact {__version__}")
     table = write_peaks(pages[0].with_name("peaks.csv"), peaks(run.history, run.columns))
-    return error, [*pages, table, *sketches, *pictures]
+    return WrittenReport(first, error, [*pages, table, *sketches, *pictures])
 
 
 def _read_sheet(folder: Path, case: Mapping[str, Any], run: RunFolder) -> Sheet:
