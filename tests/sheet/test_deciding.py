@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vi_contact.core.errors import InputError
 from vi_contact.practice.sheet.deciding import choose_numbers, measure_peak
 from vi_contact.practice.sheet.rules import RULES, find_columns
 from vi_contact.run.files.reading import RunFolder
@@ -119,6 +120,25 @@ def test_sections_and_plain_columns_and_space() -> None:
     assert choose_numbers(in_space, None)[0].column == "reaction_y_foot"
 
 
+def test_a_level_base_has_a_shear_and_no_thrust() -> None:
+    """A dam on its joint: without a support that is recorded, T of the joint is the base shear. A
+    thrust that the case asks for is refused with a column."""
+    joint = {
+        "N_joint": [1.0, 1.0, 1.0],
+        "T_joint": [0.0, -4.0, 0.0],
+        "uplift_joint": [0.0, 0.0, 0.0],
+        "level_joint": [NAN, NAN, NAN],
+    }
+    found = choose_numbers(made_run(joint), None)
+    assert [number.column for number in found] == ["T_joint", "uplift_joint"]
+    assert found[0].name == "base shear" and found[0].value == -4.0
+    with pytest.raises(InputError, match="no part of the contact is one for 'thrust': .* N_joint"):
+        choose_numbers(made_run(joint), ["thrust"])
+    upright = joint | {"level_joint": [NAN, 0.5, 0.5]}
+    columns = [number.column for number in choose_numbers(made_run(upright), None)]
+    assert columns == ["N_joint", "uplift_joint"]
+
+
 def test_named_numbers() -> None:
     """Columns as the case names them, rules by their words; sliding stays, a margin is a factor."""
     names = ["N_stem", "sliding_stem", "margin_stem", "sliding"]
@@ -130,7 +150,8 @@ def test_named_numbers() -> None:
 
 def test_every_rule_finds_a_column() -> None:
     """No word of a rule is in vain; words differ."""
-    names = WALL | dict.fromkeys(("V_a", "M_a", "racking_a", "contact_max_slip"), [0.0, 1.0, 0.0])
+    more = ("V_a", "M_a", "T_base", "racking_a", "contact_max_slip")
+    names = WALL | dict.fromkeys(more, [0.0, 1.0, 0.0])
     run = made_run(names)
     assert len({rule.word for rule in RULES}) == len(RULES)
     for rule in RULES:

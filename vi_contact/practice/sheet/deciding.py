@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.algebra import Array
+from ...core.errors import InputError
 from ...run.files.reading import RunFolder
 from ..engineering.peak_values import column_of
-from .rules import WORDS, History, Measure, find_columns, list_rules
+from .rules import WORDS, History, Measure, Rule, find_columns, list_rules
 
 NEARLY = 0.9  # of a peak: while a value is above, the peak lasts
 
@@ -56,18 +57,24 @@ def choose_numbers(run: RunFolder, names: Sequence[str] | None) -> list[Deciding
         names: columns and words of rules; None: those of the rules that apply by themselves.
 
     Raises:
-        InputError: a column that the history does not have.
+        InputError: a column that the history does not have, and a rule about parts of the contact
+            of which none is one.
     """
     if names is None:
-        words = [rule.word for rule in list_rules(run.history)]
-        found = [_apply_rule(word, run.history) for word in words]
-        return [number for number in found if not np.isnan(number.value)]
+        found = [_apply_rule(rule, run.history) for rule in list_rules(run.history)]
+        return [number for number in found if number is not None and not np.isnan(number.value)]
     numbers = []
     for name in names:
         if name in run.history or name not in WORDS:
             numbers.append(_take_column(name, run))
-        else:
-            numbers.append(_apply_rule(name, run.history))
+            continue
+        number = _apply_rule(WORDS[name], run.history)
+        if number is None:
+            raise InputError(
+                f"[sheet] numbers: no part of the contact is one for '{name}': name a column, such as "
+                f"{WORDS[name].find(run.history)[0]}"
+            )
+        numbers.append(number)
     return numbers
 
 
@@ -78,16 +85,15 @@ def measure_again(number: DecidingNumber, history: History) -> DecidingNumber | 
     return measure_column(number.name, number.column, number.measure, history, rule=number.rule)
 
 
-def _apply_rule(word: str, history: History) -> DecidingNumber:
-    """Return the number of a rule: that of the column in which it decides most."""
-    rule = WORDS[word]
+def _apply_rule(rule: Rule, history: History) -> DecidingNumber | None:
+    """Return the number of a rule, of the column in which it decides most; None without one."""
     numbers = [
         measure_column(rule.name, column, rule.measure, history, rule=rule.says)
         for column in find_columns(rule, history)
     ]
     worst = min if rule.measure is Measure.SAFETY else max
-    known = [number for number in numbers if not np.isnan(number.value)]
-    return worst(known or numbers[:1], key=lambda number: abs(number.value))
+    known = [number for number in numbers if not np.isnan(number.value)] or numbers[:1]
+    return worst(known, key=lambda number: abs(number.value), default=None)
 
 
 def _take_column(name: str, run: RunFolder) -> DecidingNumber:

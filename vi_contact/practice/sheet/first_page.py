@@ -112,7 +112,8 @@ def _write_number(number: DecidingNumber, run: RunFolder, numbers: ReportNumbers
         value = Written(write_number(number.value), "")
     else:
         value = numbers.write(number.value, number.column, unit)
-    at = UNKNOWN if np.isnan(number.t) else f"{write_number(number.t)} s"
+    nothing = np.isnan(number.t) or number.value == 0.0
+    at = UNKNOWN if nothing else f"{write_number(number.t)} s"
     name = shorten(number.name, 80, placeholder=" …")
     cells = [str(value), at, _write_duration(number)]
     return [name, number.column, *(cell.replace(" ", TOGETHER) for cell in cells)]

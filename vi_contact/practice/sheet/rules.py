@@ -15,7 +15,7 @@ from ...core.algebra import Array
 History = Mapping[str, Array]  # column -> values (rows,)
 Names = Collection[str]
 # What of a part of the contact decides: its columns are <kind>_<part>.
-_KINDS = ("N", "sliding", "opening", "uplift", "pressure_low", "pressure_high", "margin")
+_KINDS = ("N", "T", "sliding", "opening", "uplift", "pressure_low", "pressure_high", "margin")
 
 
 class Measure(Enum):
@@ -31,6 +31,7 @@ class Where(Enum):
 
     ANYWHERE = "all columns"
     BASE = "the part that carries most"
+    LEVEL_BASE = "the part that carries most, if it is level"
     UPRIGHT = "the parts that stand upright"
 
 
@@ -87,6 +88,11 @@ def _list_thrusts(names: Names) -> list[str]:
     return [name for name in names if name.startswith("N_") and f"uplift_{name[2:]}" in names]
 
 
+def _list_shears(names: Names) -> list[str]:
+    """Return the shears of parts of the contact; in space T is the size of a vector."""
+    return [f"T_{name[2:]}" for name in _list_thrusts(names) if f"T_{name[2:]}" in names]
+
+
 def _list_section_moments(names: Names) -> list[str]:
     """Return the moments of sections: a section has V too, a part of the contact has not."""
     return [name for name in names if name.startswith("M_") and f"V_{name[2:]}" in names]
@@ -100,6 +106,15 @@ RULES = (
         "the largest level force of a support",
         _find_level("reaction_"),
         "Reactions",
+    ),
+    Rule(
+        "base_friction",
+        "base shear",
+        "the largest shear of the base, as no force of a support is recorded",
+        _list_shears,
+        "Resultants",
+        where=Where.LEVEL_BASE,
+        without=("base_shear",),
     ),
     Rule(
         "section_moment",
@@ -213,25 +228,32 @@ def list_rules(names: Names) -> list[Rule]:
 def find_columns(rule: Rule, history: History) -> list[str]:
     """Return the columns of a run that a rule is about, of the parts that count alone."""
     found = [name for name in rule.find(history) if np.ndim(history[name]) == 1]
-    parts = _choose_parts(rule.where, history)
-    if not parts:
+    names = _list_thrusts(history)
+    if rule.where is Where.ANYWHERE or not names:
         return found
+    parts = _choose_parts(rule.where, [name.removeprefix("N_") for name in names], history)
     own = {f"{kind}_{part}" for kind in _KINDS for part in parts}
-    return [name for name in found if name in own] or found
+    return [name for name in found if name in own]
 
 
-def _choose_parts(where: Where, history: History) -> list[str]:
-    """Return the names of the parts of the contact that a rule is about; none for all columns."""
-    parts = [name.removeprefix("N_") for name in _list_thrusts(history)]
-    if where is Where.ANYWHERE or not parts:
-        return []
+def _choose_parts(where: Where, parts: list[str], history: History) -> list[str]:
+    """Return the parts of the contact that count.
 
+    Args:
+        where: which of them.
+        parts: names of all.
+        history: of the run.
+    """
     # The base is the part that carries most, in the mean over the rows.
     carried = {part: float(np.mean(np.abs(np.nan_to_num(history[f"N_{part}"])))) for part in parts}
     base = max(parts, key=carried.__getitem__)
-    if where is Where.BASE:
-        return [base]
 
     # A part that stands upright has a height, and so its thrust a level.
-    upright = [part for part in parts if not np.isnan(history[f"level_{part}"]).all()]
-    return [part for part in upright if part != base] or upright
+    upright = [
+        part
+        for part in parts
+        if np.isfinite(history.get(f"level_{part}", np.array([np.nan]))).any()
+    ]
+    if where is Where.UPRIGHT:
+        return [part for part in upright if part != base] or upright
+    return [] if where is Where.LEVEL_BASE and base in upright else [base]
