@@ -191,9 +191,9 @@ def _report(options: argparse.Namespace) -> str:
     lines = _format_tables(written.first) if halved else []
     lines += _format_tables(written.error) if options.refine else []
     lines += map(str, written.paths)
+    lines.append(f"report written in {write_seconds(time.perf_counter() - begin)}")
     if options.out is None and not can_write():
         lines.append(f"no report.html: {MISSING}")
-    lines.append(f"report written in {write_seconds(time.perf_counter() - begin)}")
     return "\n".join(lines)
 
 
