@@ -71,8 +71,8 @@ def choose_numbers(run: RunFolder, names: Sequence[str] | None) -> list[Deciding
         number = _apply_rule(WORDS[name], run.history)
         if number is None:
             raise InputError(
-                f"[sheet] numbers: no part of the contact is one for '{name}': name a column, such as "
-                f"{WORDS[name].find(run.history)[0]}"
+                f"[sheet] numbers: no part of the contact is one for '{name}': name a column, such "
+                f"as {WORDS[name].find(run.history)[0]}"
             )
         numbers.append(number)
     return numbers
