@@ -55,7 +55,11 @@ def test_steps_of_other_lengths_and_nothing_at_all() -> None:
 def made_run(names: dict[str, list[float]], unit: str = "N") -> RunFolder:
     """A run of three rows, 0.1 s apart."""
     history = {name: np.array(values) for name, values in names.items()}
-    columns = {name: (unit, f"meaning of {name}") for name in names}
+    columns = {
+        name: (unit, f"value of {name}, upwards, {kind} x")
+        for name in names
+        for kind in ["part" if name[0] == "N" else "nothing"]
+    }
     return RunFolder(Path(), history | {"t": 0.1 * np.arange(3)}, columns, {}, None)
 
 
@@ -146,7 +150,8 @@ def test_named_numbers() -> None:
     found = choose_numbers(made_run(WALL), names)
     assert [number.value for number in found] == [7.0, 9.0, 1.0, 1.5]
     assert [number.short_name for number in found] == [*names[:3], "sliding that stays"]
-    assert found[0].name == "meaning of N_stem" and not found[0].rule
+    assert found[0].name == "value of N_stem, part x" and not found[0].rule
+    assert choose_numbers(made_run(WALL), ["u_x_top"])[0].name == "value of u_x_top"
 
 
 def test_every_rule_finds_a_column() -> None:

@@ -47,6 +47,7 @@ def sketch(model: Mapping[str, Any]) -> Any:
             edgecolors=colours[part["group"]] if held else "0.3",
             linewidths=3.0 if held else 0.8,
         )
+    _name_materials(axis, model.get("bodies", ()), d)
     for k, part in enumerate(model["contact"]):
         _draw_contact(axis, part, d, DOTS[k % len(DOTS)])
     ends = np.concatenate([_read_points(part["lines"], d) for part in model["outline"]])
@@ -55,7 +56,6 @@ def sketch(model: Mapping[str, Any]) -> Any:
     set_limits(axis, low, high, margin=0.06 if d != 2 else 0.14)
     if d == 2:
         _draw_dimensions(axis, low, high)
-    _name_materials(axis, model.get("bodies", ()), d)
     axis.set_title(escape_dollars(model["title"]))
     axis.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), fontsize=8, frameon=False)
     return figure

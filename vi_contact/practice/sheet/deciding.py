@@ -114,7 +114,15 @@ def _take_column(name: str, run: RunFolder) -> DecidingNumber:
             Measure.SAFETY,
             history,
         )
-    return measure_column(meaning, name, Measure.PEAK, history)
+    return measure_column(_shorten_meaning(meaning), name, Measure.PEAK, history)
+
+
+def _shorten_meaning(meaning: str) -> str:
+    """Return what a column is without its sign convention: up to a comma, and of which part."""
+    first, *rest = meaning.split(", ")
+    if rest and rest[-1].startswith(("part ", "section ")):
+        return f"{first}, {rest[-1]}"
+    return first
 
 
 def measure_column(
