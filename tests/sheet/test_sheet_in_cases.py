@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from written_runs import write_run
 
 pytest.importorskip("dolfinx")
 
@@ -92,6 +93,29 @@ def test_half_the_time_step_alone(tmp_path: Path, capsys: pytest.CaptureFixture[
     error, _ = report(out, out=tmp_path / "page.pdf")
     assert error.tables and "half the time step (dt/2)" in error.sentences[0]
     assert "element size" not in error.sentences[0]
+
+
+@pytest.mark.parametrize(
+    ("facts", "cost"),
+    [
+        # the seconds of a continued run are those since then
+        ({"seconds": 12.0, "seconds_per_step": 0.1, "steps": 5}, "the run took 12 s; dt/2 will"),
+        ({"seconds": 2.0, "seconds_per_step": 3.0, "steps": 5}, "the run took 15 s; dt/2 will"),
+        (
+            {"seconds": 7200.0},
+            "the run took 2 h; dt/2 will take about 4 h, h/2 will take at least 8 h",
+        ),
+        ({"seconds": 150.0}, "the run took 2.5 min; dt/2 will take about 5 min"),
+        ({}, "how long dt/2 will take is unknown"),
+    ],
+)
+def test_the_cost_in_words(tmp_path: Path, facts: dict[str, float], cost: str) -> None:
+    """Half the step costs twice the time; half the elements four times, in the plane."""
+    columns = {"u_x_top": ("m", "displacement", np.arange(6.0))}
+    case = "[mesh]\n[run]\ndt = 0.5\nsteps = 5\n"
+    more = {"dt": 0.5, "steps": 5} | facts
+    folder = write_run(tmp_path / "run", columns, dt=0.5, case=case, facts=more)
+    assert estimate_cost(folder, ["dt", "h"]).startswith(cost)
 
 
 def test_a_number_that_the_run_does_not_have_is_told_before(

@@ -174,7 +174,9 @@ def _report(options: argparse.Namespace) -> str:
     comm = world()
     if options.out is not None:
         output_file(options.out)
-    halved = ("h", "dt") if options.refine else ("dt",) if options.halved else ()
+    halved = ["dt"] if options.halved else []
+    if options.refine:
+        halved = ["h", "dt"]
     failed = None
     if halved:
         cost = estimate_cost(options.folder, halved)

@@ -235,7 +235,8 @@ def _list_results(
         thrust = run.history.get(f"N_{part}") if kind in ("height", "level") else None
         row = int(np.nanargmax(np.abs(values) if thrust is None else thrust + 0.0 * values))
         factor, unit = numbers.choose_unit(name, unit)
-        scaled = [factor * values[row], t[row], factor * values[0], factor * values[-1]]
+        of_rows = [factor * float(values[place]) for place in (row, 0, -1)]
+        scaled = [of_rows[0], float(t[row]), *of_rows[1:]]
         yield [title, name, unit, *map(write_number, scaled)]
 
 

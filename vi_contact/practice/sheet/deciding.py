@@ -140,7 +140,7 @@ def measure_column(
     t = history["t"]
     values = history[column]
     if measure is Measure.STAYS:
-        stays = float(values[-1] - values[0])
+        stays = float(values[-1]) - float(values[0])
         return DecidingNumber(name, column, measure, stays, float(t[-1]), np.nan, 0, rule)
     if measure is Measure.SAFETY:
         used = 1.0 - values  # of the friction; its peak is the smallest factor

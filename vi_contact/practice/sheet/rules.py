@@ -244,9 +244,10 @@ def _choose_parts(where: Where, parts: list[str], history: History) -> list[str]
         parts: names of all.
         history: of the run.
     """
-    # The base is the part that carries most, in the mean over the rows.
-    carried = {part: float(np.mean(np.abs(np.nan_to_num(history[f"N_{part}"])))) for part in parts}
-    base = max(parts, key=carried.__getitem__)
+    # The base is the part that carries most, in the median of the rows.
+    base = max(
+        parts, key=lambda part: float(np.median(np.abs(np.nan_to_num(history[f"N_{part}"]))))
+    )
 
     # A part that stands upright has a height, and so its thrust a level.
     upright = [

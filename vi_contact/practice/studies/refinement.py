@@ -114,11 +114,22 @@ def estimate_cost(folder: str | Path, names: Sequence[str]) -> str:
 
 
 def _read_seconds(run: RunFolder) -> float | None:
-    """Return how long a run took [s]; None where nothing tells it."""
-    seconds = run.facts.get("seconds")
-    if isinstance(seconds, bool) or not isinstance(seconds, int | float):
+    """Return how long a run took [s]; None where nothing tells it.
+
+    The seconds of a run that was continued are those since then: its steps took longer.
+    """
+    seconds: Any = run.facts.get("seconds")
+    per_step: Any = run.facts.get("seconds_per_step")
+    steps: Any = run.facts.get("steps")
+    if not _is_number(seconds):
         return None
-    return float(seconds)
+    marched = per_step * steps if _is_number(per_step) and _is_number(steps) else 0.0
+    return float(max(seconds, marched))
+
+
+def _is_number(value: Any) -> bool:
+    """Tell whether an entry of summary.json is a number."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def write_seconds(seconds: float) -> str:
