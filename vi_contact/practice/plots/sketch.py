@@ -1,13 +1,11 @@
 """Draw a model from what model.json says of it: outline, supports and the parts of the contact."""
 
 from collections.abc import Mapping, Sequence
-from textwrap import shorten
 from typing import Any
 
 import numpy as np
 
 from ...core.algebra import Array
-from ..units.report_units import ReportUnits, write_number, write_quantity
 from .faces import add_polygons, set_limits, sheet
 from .histories import escape_dollars
 
@@ -29,11 +27,10 @@ DOTS = ("tab:red", "tab:orange", "tab:pink", "maroon")  # of parts of the contac
 def sketch(model: Mapping[str, Any]) -> Any:
     """Return a matplotlib Figure of a model.
 
-    It has the outline of the model, in the plane with its dimensions, in space boxes around its
-    bodies; in colours the groups that hold it; as dots the points of each part of the contact; and
-    beside it the materials.
+    It has the outline of the model, in space boxes around its bodies; in colours the groups that
+    hold it; and as dots the points of each part of the contact.
 
-    model: the keys title, dimension, outline, supports, contact and bodies of model.json.
+    model: the keys title, dimension, outline, supports and contact of model.json.
     """
     d = model["dimension"]
     figure, axes = sheet([d < 3], 1, (7.6, 6.0))
@@ -47,15 +44,10 @@ def sketch(model: Mapping[str, Any]) -> Any:
             edgecolors=colours[part["group"]] if held else "0.3",
             linewidths=3.0 if held else 0.8,
         )
-    _name_materials(axis, model.get("bodies", ()), d)
     for k, part in enumerate(model["contact"]):
         _draw_contact(axis, part, d, DOTS[k % len(DOTS)])
     ends = np.concatenate([_read_points(part["lines"], d) for part in model["outline"]])
-    low = ends.min(axis=0)
-    high = ends.max(axis=0)
-    set_limits(axis, low, high, margin=0.06 if d != 2 else 0.14)
-    if d == 2:
-        _draw_dimensions(axis, low, high)
+    set_limits(axis, ends.min(axis=0), ends.max(axis=0), margin=0.06)
     axis.set_title(escape_dollars(model["title"]))
     axis.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), fontsize=8, frameon=False)
     return figure
@@ -72,43 +64,6 @@ def _name_supports(axis: Any, supports: Sequence[Mapping[str, Any]], d: int) -> 
         axis.plot(*nowhere, lw=3.0, color=colour, label=escape_dollars(label))
         colours |= dict.fromkeys(support["groups"], colour)
     return colours
-
-
-def _name_materials(axis: Any, bodies: Sequence[Mapping[str, Any]], d: int) -> None:
-    """Add the bodies with their materials to the legend, by lines without points."""
-    nowhere = np.full((max(d, 2), 1), np.nan)
-    for body in bodies:
-        material = body.get("material")
-        numbers = material if isinstance(material, Mapping) else {}
-        words = []
-        if isinstance(numbers.get("E"), float):
-            stiff = numbers["E"] >= 1e9
-            modulus = ReportUnits(modulus="GPa" if stiff else "MPa")
-            words.append(f"E = {write_quantity(numbers['E'], 'Pa', modulus, quantity='modulus')}")
-        if isinstance(numbers.get("rho"), float):
-            words.append(f"{write_number(numbers['rho'])} kg/m³")
-        label = f"{body.get('name')}: {', '.join(words) or numbers.get('type', '-')}"
-        axis.plot(*nowhere, ls="", label=escape_dollars(shorten(label, 60, placeholder=" …")))
-
-
-def _draw_dimensions(axis: Any, low: Array, high: Array) -> None:
-    """Draw the width of a model below it, and its height to the left."""
-    size = high - low
-    away = 0.07 * float(size.max())
-    ends = {"arrowstyle": "<->", "lw": 0.8, "color": "0.3", "shrinkA": 0.0, "shrinkB": 0.0}
-    below = low[1] - away
-    left = low[0] - away
-    axis.annotate("", (low[0], below), (high[0], below), arrowprops=ends)
-    axis.annotate("", (left, low[1]), (left, high[1]), arrowprops=ends)
-    look = {"ha": "center", "va": "center", "fontsize": 8, "bbox": {"fc": "white", "ec": "none"}}
-    middle = low + 0.5 * size
-    axis.text(middle[0], below, _write_size(size[0]), **look)
-    axis.text(left, middle[1], _write_size(size[1]), rotation=90.0, **look)
-
-
-def _write_size(metres: float) -> str:
-    """Write a width or a height."""
-    return str(write_quantity(metres, "m", ReportUnits(), quantity="size"))
 
 
 def _draw_contact(axis: Any, part: Mapping[str, Any], d: int, colour: str) -> None:

@@ -138,6 +138,7 @@ class _Schema:
         members = [member for member in members if member != FIELD or float not in members]
         choices = [choice for member in members for choice in self._describe_member(member)]
         choices += self._describe_tables(members)
+        choices = [choice for k, choice in enumerate(choices) if choice not in choices[:k]]
         if not choices or {} in choices:
             return {}
         return choices[0] if len(choices) == 1 else {"anyOf": choices}
