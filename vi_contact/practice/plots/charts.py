@@ -20,6 +20,7 @@ from ..ground_motion.spectra import response_spectrum
 from .histories import (
     LEDGER,
     draw_curve,
+    fit_title,
     list_shaken_axes,
     panels,
     plain_numbers,
@@ -130,13 +131,16 @@ def chart_histories(run: Run, groups: Mapping[str, Sequence[str]]) -> list[Chart
             if names:
                 unit, *_ = run.columns[names[0]]
                 same = [name for name in names if run.columns[name][0] == unit]
-                charts += _chart_sizes(run, same, title)
+                charts += _chart_sizes(run, same, title, prefix)
                 break
     return charts
 
 
-def _chart_sizes(run: Run, names: Sequence[str], title: str) -> list[Chart]:
-    """Chart columns of one unit, those of very different sizes apart; largest come first."""
+def _chart_sizes(run: Run, names: Sequence[str], title: str, prefix: str) -> list[Chart]:
+    """Chart columns of one unit and beginning, those of very different sizes apart.
+
+    Largest come first. Titles of charts that stand apart name what is on them.
+    """
     groups: list[list[str]] = []
     largest = 0.0
     for name in names:
@@ -149,8 +153,8 @@ def _chart_sizes(run: Run, names: Sequence[str], title: str) -> list[Chart]:
         return [chart_columns(run, names, title)]
     charts = []
     for group in groups:
-        more = ", …" if len(group) > 2 else ""
-        charts.append(chart_columns(run, group, f"{title}: {', '.join(group[:2])}{more}"))
+        parts = [name.removeprefix(prefix) for name in group]
+        charts.append(chart_columns(run, group, f"{title}: {', '.join(parts)}"))
     return charts
 
 
@@ -315,7 +319,7 @@ def draw_chart(axis: Any, chart: Chart) -> None:
         label = f"tolerance {chart.bound:g}"
         axis.axhline(chart.bound, color="tab:red", ls="--", lw=0.8, label=label)
     legend = put_legend_above(axis, 6.0)
-    axis.set_title(chart.title, loc="left", pad=legend + TITLE_PAD)
+    axis.set_title(fit_title(axis, chart.title), loc="left", pad=legend + TITLE_PAD)
     if not chart.log_x:
         axis.margins(x=0.0)
     axis.set(xlabel=chart.x, ylabel=chart.y)

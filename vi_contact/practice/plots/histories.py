@@ -124,7 +124,7 @@ def put_legend_above(axis: Any, size: float = 7.0) -> float:
 
     # As many columns as fit; a name that is wider than the axis is cut.
     letters = int(width / (LETTER * size) - HANDLE / LETTER)
-    labels = [text if len(text) <= letters else text[: letters - 1] + "…" for text in labels]
+    labels = [cut(text, letters) for text in labels]
     widest = size * (LETTER * max(map(len, labels)) + HANDLE)
     columns = max(1, min(len(labels), int(width / widest)))
     rows = -(-len(labels) // columns)  # rounded up
@@ -149,6 +149,21 @@ def put_legend_above(axis: Any, size: float = 7.0) -> float:
         lower = height / (points * figure.bbox.height)
         axis.set_position([place.x0, place.y0, place.width, max(place.height - lower, 0.01)])
     return height
+
+
+def fit_title(axis: Any, title: str) -> str:
+    """Return a title cut to the width of its axis, or it would run over its neighbour's."""
+    from matplotlib import rcParams
+    from matplotlib.font_manager import FontProperties
+
+    size = FontProperties(size=rcParams["axes.titlesize"]).get_size_in_points()
+    width = axis.get_window_extent().width * 72.0 / axis.figure.dpi
+    return cut(title, int(width / (LETTER * size)))
+
+
+def cut(text: str, letters: int) -> str:
+    """Return a text of at most so many letters, the last of which tells that it was cut."""
+    return text if len(text) <= letters else text[: letters - 1] + "…"
 
 
 def canvas(

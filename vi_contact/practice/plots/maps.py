@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array, Indices
+from .faces import PULLS
 from .histories import cell_edges, scale_values
 
 STRAIGHT = 1e-6  # what a line of points may deviate, over its length
 NO_GAP = 1e-15  # gaps below it are none, over the length of the contact line
-# Over the size of an axis that faces share: width of a panel, and of its colour bar; between panels.
+# Over the size of an axis that faces share: widths of a panel and of its colour bar, and what is
+# between two panels.
 PANEL = 0.92
 BAR = 0.015
 BETWEEN = 0.09
@@ -95,7 +97,8 @@ def draw_cells(
 ) -> tuple[Any, str, bool]:
     """Draw values over time and place in colours, without a colour bar.
 
-    The colours go from white upwards or, where some values are negative, to both sides of it.
+    The colours go from white upwards or, where some values are negative, get darker all the way
+    from the least one and change their hue at zero.
 
     Args:
         axis: matplotlib's.
@@ -109,12 +112,15 @@ def draw_cells(
         (image, unit with its prefix, whether some values are negative).
     """
     from matplotlib import colormaps
+    from matplotlib.colors import LinearSegmentedColormap
 
     order = np.argsort(position, kind="stable")
     scaled, prefixed = scale_values(values[:, order], unit)
     size = float(np.nanmax(np.abs(scaled), initial=0.0)) or 1.0
     pulling = bool(np.any(scaled < 0.0))
-    palette = colormaps["RdBu_r" if pulling else colours].with_extremes(under="white")
+    palette = LinearSegmentedColormap.from_list("pulls", PULLS)
+    if not pulling:
+        palette = colormaps[colours].with_extremes(under="white")
     low = -size if pulling else 1e-9 * size
     axis.grid(False)
     image = axis.pcolormesh(
