@@ -66,6 +66,7 @@ PANEL = 2.7
 NUMBERS = 0.45  # on the left of a panel
 HEIGHTS = (1.3, 4.6)
 BESIDE = 1.5
+TOGETHER = "\u00a0"  # a blank at which no line breaks
 SMALL = {"font.size": 8, "xtick.labelsize": 7, "ytick.labelsize": 7}
 
 
@@ -417,8 +418,11 @@ def _lay_out_plane(scene: Scene, frictional: bool) -> tuple[Any, Array]:
 
 def _compose_title(title: str, scene: Scene) -> str:
     """Return a title on lines that fit above the picture, with the factor of displacements."""
-    factor = f" (displacements x {scene.magnified:g})" if scene.magnified != 1.0 else ""
-    return "\n".join(wrap(escape_dollars(title) + factor, 64))
+    factor = ""
+    if scene.magnified != 1.0:
+        factor = f" (displacements{TOGETHER}x{TOGETHER}{scene.magnified:g})"
+    lines = wrap(escape_dollars(title) + factor, 64)
+    return "\n".join(lines).replace(TOGETHER, " ")
 
 
 @check_arguments
