@@ -219,6 +219,7 @@ class Painter:
         """Draw the colour bar on an axis of its own."""
         from matplotlib.cm import ScalarMappable
 
+        axis.grid(False)
         mappable = ScalarMappable(self.norm, self.cmap)
         figure.colorbar(mappable, cax=axis, label=self.label, **look)
 

@@ -260,6 +260,7 @@ def _draw_faces(axis: Any, shown: _Map, faces: Mapping[str, slice]) -> None:
         panel = axis.inset_axes([0.0, bottom, PANEL, height])
         bar = axis.inset_axes([PANEL + BAR, bottom, BAR, height])
         image, unit = shown.draw(panel, rows)
+        bar.grid(False)
         axis.figure.colorbar(image, cax=bar, label=f"[{unit}]")
         panel.set_title(name, loc="left", pad=2.0, fontsize=7)
         panel.locator_params("y", nbins=4)

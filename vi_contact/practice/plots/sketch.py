@@ -13,7 +13,7 @@ from ...core.algebra import Array
 from ..units.report_units import write_number
 from .borders import Border, chain_border
 from .faces import add_polygons, set_limits
-from .histories import STYLE, escape_dollars, require_matplotlib, scale
+from .histories import STYLE, cut, escape_dollars, require_matplotlib, scale
 from .labels import Labels
 
 # Colour and dashes of what holds the bodies: each is another one's nowhere in grey.
@@ -56,6 +56,7 @@ LEAST_ARROW = 0.4  # of other arrows, over that length
 WIDTH = 7.4
 HEIGHTS = (1.6, 6.0)
 LETTER = 0.07  # width of a letter in the picture [inches]
+LONGEST = 48  # letters of a name in the legend, which would leave the model no room
 LEADER = np.array([-1.0, 0.6])  # direction in which the name of a slender body stands
 
 
@@ -90,12 +91,16 @@ def sketch(model: Mapping[str, Any]) -> Any:
         title += "\n" + " × ".join(f"{write_number(length)} m" for length in high - low)
         _write_names_in_space(axis, model)
     else:
-        labels = Labels(axis, WIDTH / float(np.ptp(axis.get_xlim())))
-        _write_size(labels, low, high, BEYOND * size)
-        _write_names(labels, model, holds, d)
-        _draw_loads(labels, model.get("loads"), d, size)
+        room = Labels(axis, WIDTH / float(np.ptp(axis.get_xlim())))
+        _write_size(room, low, high, BEYOND * size)
+        _write_names(room, model, holds, d)
+        _draw_loads(room, model.get("loads"), d, size)
     axis.set_title(title, fontsize=11)
-    axis.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), fontsize=8, frameon=False)
+    handles, labels = axis.get_legend_handles_labels()
+    names = [cut(label, LONGEST) for label in labels]
+    axis.legend(
+        handles, names, loc="upper left", bbox_to_anchor=(1.02, 1.0), fontsize=8, frameon=False
+    )
     return figure
 
 
@@ -258,7 +263,7 @@ def _write_names(
 
     # Bodies first: a name that fits into its body has no other place.
     bodies = model.get("bodies") or ()
-    for number, border in _list_borders(outline):
+    for number, border in _list_borders(outline) if d == 2 else ():
         if number < len(bodies):
             _write_inside(labels, escape_dollars(str(bodies[number].get("name", ""))), border)
 
