@@ -5,7 +5,7 @@ settings change.
 """
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -122,11 +122,7 @@ def put_legend_above(axis: Any, size: float = 7.0) -> float:
     box = axis.get_window_extent()
     width = max(box.width * points, 20.0 * size)
 
-    # As many columns as fit; a name that is wider than the axis is cut.
-    letters = int(width / (LETTER * size) - HANDLE / LETTER)
-    labels = [cut(text, letters) for text in labels]
-    widest = size * (LETTER * max(map(len, labels)) + HANDLE)
-    columns = max(1, min(len(labels), int(width / widest)))
+    labels, columns = arrange_names(labels, width, size)
     rows = -(-len(labels) // columns)  # rounded up
     height = ROW * size * rows + 2.0
     axis.legend(
@@ -149,6 +145,48 @@ def put_legend_above(axis: Any, size: float = 7.0) -> float:
         lower = height / (points * figure.bbox.height)
         axis.set_position([place.x0, place.y0, place.width, max(place.height - lower, 0.01)])
     return height
+
+
+def arrange_names(names: Sequence[str], width: float, size: float) -> tuple[list[str], int]:
+    """Return the names of a legend, cut where one is wider than its room, and its columns.
+
+    Args:
+        names: at least one.
+        width: of the room [points].
+        size: of the letters [points].
+    """
+    letters = max(int(width / (LETTER * size) - HANDLE / LETTER), 2)
+    shown = [cut(name, letters) for name in names]
+    widest = size * (LETTER * max(map(len, shown)) + HANDLE)
+    return shown, max(1, min(len(shown), int(width / widest)))
+
+
+def put_legend_on_top(figure: Any, handles: Sequence[Any], names: Sequence[str]) -> None:
+    """Put a legend above all axes of a figure with a layout engine, as wide as the figure at most.
+
+    Args:
+        figure: matplotlib's, without a title.
+        handles: of the curves.
+        names: of the curves.
+    """
+    if not names:
+        return
+    size = 8.0
+    shown, columns = arrange_names(names, 72.0 * float(figure.get_figwidth()) - 20.0, size)
+    rows = -(-len(shown) // columns)  # rounded up
+    figure.set_figheight(figure.get_figheight() + (rows - 1) * ROW * size / 72.0)
+    # keeps room for the legend, which the layout of matplotlib 3.6 does not
+    figure.suptitle("\n".join([" "] * (rows + 1)), fontsize=size, linespacing=ROW)
+    figure.legend(
+        handles,
+        shown,
+        loc="upper center",
+        ncol=columns,
+        fontsize=size,
+        frameon=False,
+        handlelength=2.8,
+        columnspacing=1.0,
+    )
 
 
 def fit_title(axis: Any, title: str) -> str:
