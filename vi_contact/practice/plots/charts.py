@@ -3,7 +3,7 @@
 Charts are numbers: the printed page and the one for browsers draw the same.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -41,6 +41,7 @@ CURVES = 8  # of probes in an overview: beyond, nobody tells them apart
 SEEN = 0.1
 TITLE_PAD = 3.0  # points, between a legend and the title above it
 Run = Any  # a Solution, or a RunFolder, which needs h5py
+UnitChoice = Callable[[str, str], tuple[float, str]]
 
 
 @dataclass(frozen=True)
@@ -112,13 +113,16 @@ def chart_motion(run: Run) -> list[Chart]:
     return charts
 
 
-def chart_histories(run: Run, groups: Mapping[str, Sequence[str]]) -> list[Chart]:
+def chart_histories(
+    run: Run, groups: Mapping[str, Sequence[str]], choose_unit: UnitChoice | None = None
+) -> list[Chart]:
     """Chart what moves during a run.
 
     Args:
         run: Solution or RunFolder.
         groups: title of a chart -> beginnings of names of columns, of which the first whose columns
             move is charted.
+        choose_unit: as of ``chart_columns``.
 
     Returns:
         charts for every title whose columns move; of these, those with the unit of the first. What
@@ -131,12 +135,18 @@ def chart_histories(run: Run, groups: Mapping[str, Sequence[str]]) -> list[Chart
             if names:
                 unit, *_ = run.columns[names[0]]
                 same = [name for name in names if run.columns[name][0] == unit]
-                charts += _chart_sizes(run, same, title, prefix)
+                charts += _chart_sizes(run, same, title, prefix, choose_unit)
                 break
     return charts
 
 
-def _chart_sizes(run: Run, names: Sequence[str], title: str, prefix: str) -> list[Chart]:
+def _chart_sizes(
+    run: Run,
+    names: Sequence[str],
+    title: str,
+    prefix: str,
+    choose_unit: UnitChoice | None,
+) -> list[Chart]:
     """Chart columns of one unit and beginning, those of very different sizes apart.
 
     Largest come first. Titles of charts that stand apart name what is on them.
@@ -150,30 +160,42 @@ def _chart_sizes(run: Run, names: Sequence[str], title: str, prefix: str) -> lis
             largest = extent
         groups[-1].append(name)
     if len(groups) == 1:
-        return [chart_columns(run, names, title)]
+        return [chart_columns(run, names, title, choose_unit)]
     charts = []
     for group in groups:
         parts = [name.removeprefix(prefix) for name in group]
-        charts.append(chart_columns(run, group, f"{title}: {', '.join(parts)}"))
+        named = f"{title}: {', '.join(parts)}"
+        charts.append(chart_columns(run, group, named, choose_unit))
     return charts
 
 
-def chart_columns(run: Run, names: Sequence[str], title: str) -> Chart:
-    """Chart the histories of columns, with a prefix of the unit that fits.
+def chart_columns(
+    run: Run, names: Sequence[str], title: str, choose_unit: UnitChoice | None = None
+) -> Chart:
+    """Chart the histories of columns.
 
     Args:
         run: Solution or RunFolder.
         names: columns of one unit.
         title: stands above.
+        choose_unit: returns (factor, name of the unit) for a column and its SI unit; None: the SI
+            unit with the prefix that fits.
     """
     unit, *_ = run.columns[names[0]]
-    values, prefixed = scale_values(np.array([run.history[name] for name in names]), unit)
+    values = np.array([run.history[name] for name in names])
+    if choose_unit is None:
+        values, prefixed = scale_values(values, unit)
+    else:
+        factor, prefixed = choose_unit(names[0], unit)
+        values = factor * values
     lines = [Line(name, run.history["t"], row) for name, row in zip(names, values, strict=True)]
     return Chart(title, "time [s]", f"[{prefixed}]", tuple(lines))
 
 
-def chart_groups(run: Run, groups: Sequence[Sequence[str]]) -> list[Chart]:
-    """Chart each group of columns.
+def chart_groups(
+    run: Run, groups: Sequence[Sequence[str]], choose_unit: UnitChoice | None = None
+) -> list[Chart]:
+    """Chart each group of columns; ``choose_unit`` as of ``chart_columns``.
 
     InputError for columns that do not exist, or of different units.
     """
@@ -185,7 +207,7 @@ def chart_groups(run: Run, groups: Sequence[Sequence[str]]) -> list[Chart]:
             raise InputError(
                 f"columns {', '.join(group)} have different units: draw one chart for each unit"
             )
-    return [chart_columns(run, group, ", ".join(group)) for group in groups]
+    return [chart_columns(run, group, ", ".join(group), choose_unit) for group in groups]
 
 
 def list_varying(run: Run, prefix: str) -> list[str]:
