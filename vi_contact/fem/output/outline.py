@@ -70,10 +70,8 @@ def outline(
         boxes have the number of their region too.
     """
     if space.dimension != 2:
-        return [
-            {"group": "", "region": number, "lines": _draw_box(space, cells)}
-            for number, cells in enumerate(regions)
-        ]
+        boxes = [_draw_box(space, cells) for cells in regions]
+        return [_describe_region(number, lines) for number, lines in enumerate(boxes)]
     mesh = space.mesh
     boundary = Facets.where("", mesh, lambda x: np.ones(x.shape[1], dtype=bool))
     groups = [boundary, *(group for group in tags.values() if isinstance(group, Facets))]
@@ -89,8 +87,13 @@ def outline(
         parts = mesh.comm.gather(lines) or []
         drawn.append({"group": group.name, "lines": sorted(sum(parts, []))})
     for number, cells in enumerate(regions):
-        drawn.append({"group": "", "region": number, "lines": _draw_border(mesh, cells)})
+        drawn.append(_describe_region(number, _draw_border(mesh, cells)))
     return drawn
+
+
+def _describe_region(number: int, lines: list[list[float]]) -> dict[str, Any]:
+    """Return the lines round the region of this number, as ``outline`` does."""
+    return {"group": "", "region": number, "lines": lines}
 
 
 def _draw_border(mesh: Any, cells: Indices) -> list[list[float]]:

@@ -178,7 +178,7 @@ def _draw_outline(axis: Any, outline: Any, holds: Mapping[str, tuple[str, Any]],
             add_polygons(axis, lines, edgecolors="0.25", linewidths=0.8)
             continue
         colour, dash = holds[part["group"]]
-        chains: Sequence[Array] = lines
+        chains: Sequence[Array] = list(lines)
         if d == 2:  # in one piece, or dashes would begin anew at each facet
             chains = chain_border(lines.reshape(-1, 4)).chains
         for chain in chains:
@@ -242,12 +242,13 @@ def _list_loads(loads: Any) -> Iterator[tuple[str, bool, Array, Array]]:
             continue
         force = load.get("force") or load.get("resultant")
         point = load.get("point")
-        if np.size(force) != 2 or np.size(point) != 2 or force is None or point is None:
-            continue
+        if force is None or point is None:
+            continue  # a couple, or what acts on no mesh
         vector = np.array(force, dtype=float)
-        if np.any(vector) and np.all(np.isfinite(vector)):
+        place = np.array(point, dtype=float)
+        if vector.shape == place.shape == (2,) and np.any(vector) and np.all(np.isfinite(vector)):
             name = str(load.get("name", load.get("kind", "load")))
-            yield name, load.get("kind") == "weight", np.array(point, dtype=float), vector
+            yield name, load.get("kind") == "weight", place, vector
 
 
 def _write_names(
