@@ -262,7 +262,7 @@ def _draw_faces(axis: Any, shown: _Map, faces: Mapping[str, slice]) -> None:
         image, unit = shown.draw(panel, rows)
         bar.grid(False)
         axis.figure.colorbar(image, cax=bar, label=f"[{unit}]")
-        panel.set_title(name, loc="left", pad=2.0, fontsize=7)
+        panel.set_title(name, loc="left", pad=2.0, fontsize=8)
         panel.locator_params("y", nbins=4)
         bar.locator_params("y", nbins=4)
         if place + 1 < len(faces):
