@@ -32,7 +32,7 @@ from .histories import STYLE, History, escape_dollars, length_unit, require_matp
 ARROW = 0.15  # length of the longest arrow, over the size of the largest face
 NEIGHBOURS = 24  # nearest points that make one face if they point the same way
 # State -> what it is called, and its colour: in grey white, dark and between.
-STATES = {OPEN: ("open", "white"), STICK: ("stick", "#1f4e8c"), SLIP: ("slip", "#f5a623")}
+STATES = {OPEN: ("open", "white"), STICK: ("stick", "#3f7fbf"), SLIP: ("slip", "#f5a623")}
 # Colours of pressures that pull and press: lightness falls all the way, the hue changes at zero.
 PULLS = ("#e8f4ff", "#9ecae8", "#b0a090", "#b03020", "#3a0606")
 

@@ -56,6 +56,7 @@ LEAST_ARROW = 0.4  # of other arrows, over that length
 WIDTH = 7.4
 HEIGHTS = (1.6, 6.0)
 LETTER = 0.07  # width of a letter in the picture [inches]
+INK = 0.65  # brightness of a name over that of what it names, which may be pale
 LONGEST = 48  # letters of a name in the legend, which would leave the model no room
 LEADER = np.array([-1.0, 0.6])  # direction in which the name of a slender body stands
 
@@ -310,12 +311,15 @@ def _write_inside(labels: Labels, name: str, border: Border) -> None:
 
 def _write_beside(labels: Labels, name: str, points: Array, centre: Array, colour: str) -> None:
     """Write the name of a line of points beside its middle, away from a centre."""
+    from matplotlib.colors import to_rgb
+
     extent = np.ptp(points, axis=0)
     middle = points[int(np.linalg.norm(points - points.mean(axis=0), axis=1).argmin())]
     across = int(extent[1] <= extent[0])  # a flat line has its name above or below
     away = np.zeros(2)
     away[across] = 1.0 if middle[across] > centre[across] else -1.0
-    labels.write(escape_dollars(name), middle, away, color=colour)
+    dark = INK * np.array(to_rgb(colour))
+    labels.write(escape_dollars(name), middle, away, color=tuple(dark))
 
 
 def _find_middle(points: Array) -> Array:
