@@ -190,7 +190,7 @@ def test_what_was_not_recorded_has_no_section(solved: tuple[Path, vc.Solution]) 
         "Peak values of all columns",
     ]
     assert [chart.title for one in found for chart in one.charts] == [
-        "displacement",
+        "displacement along x",
         "certificate of every step",
     ]
     chosen = sections_of(run, {}, [["N_right", "contact_resultant"]])

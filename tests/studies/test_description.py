@@ -151,7 +151,7 @@ def test_any_number_of_ranks_describes_alike(shared_tmp: Path) -> None:
     whole, alone = described(path), described(path, MPI.COMM_SELF)
     assert [
         len(one["lines"]) for one in alone["outline"] if one["group"] in ("", "upper_left")
-    ] == [36, 8]
+    ] == [36, 8, 18, 18]
     read_case(path).run(COMM, out=shared_tmp / "run", progress=False)
     kept = json.loads((shared_tmp / "run" / "model.json").read_text("utf-8"))
     for model in (whole, kept) if COMM.rank == 0 else (whole,):
@@ -250,10 +250,11 @@ def test_a_sketch_shows_what_holds_and_touches(tmp_path: Path, d: int) -> None:
     (axis,) = sketch(model).axes
     names = [one.get_text() for one in axis.get_legend().get_texts()]
     letters = ", ".join("xyz"[:d])
-    assert names[0] == f"clamped {letters}: lower_{'left' if d == 1 else 'bottom'}" and names[
-        -1
-    ].startswith("contact")
-    assert len(model["outline"]) == {1: 2, 2: 9, 3: 2}[d]
+    bodies = ["lower: E = 1.8 GPa, 2000 kg/m³", "upper: E = 1.8 GPa, 2000 kg/m³"] if d == 2 else []
+    assert names[: len(bodies)] == bodies
+    assert names[len(bodies)] == f"fixed {letters}: lower_{'left' if d == 1 else 'bottom'}"
+    assert names[-1].startswith("contact")
+    assert len(model["outline"]) == {1: 2, 2: 11, 3: 2}[d]
     dots = axis.lines[-1]
     shown = np.array(dots.get_data_3d() if d == 3 else dots.get_xydata().T)
     assert shown[min(d - 1, 1)] == pytest.approx(2.0)

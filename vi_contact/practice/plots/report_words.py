@@ -21,16 +21,24 @@ SUMMARY = {
 }
 # Charts of histories: title -> beginnings of columns; of these the first that move.
 CHARTS = {
-    "displacement": ("u_",),
-    "contact force": ("contact_resultant", "N_", "contact_force_"),
-    "uplift ratio": ("contact_uplift", "uplift_"),
-    "force of the support": ("reaction_x_", "reaction_y_", "reaction_z_"),
-    "racking and rocking": ("racking_", "theta_"),
-    "shear force": ("V_",),
-    "bending moment": ("M_", "reaction_M"),
-    "slip": ("contact_max_slip", "slip_"),
-    "absolute acceleration": ("a_x_", "a_y_", "a_z_"),
-    "contact pressure": ("contact_max_pressure",),
+    "thrust, normal force": ("N_", "contact_resultant", "contact_force_"),
+    "shear on a part": ("T_",),
+    "sliding": ("sliding_", "slip_", "contact_max_slip"),
+    "opening": ("opening_",),
+    "open share": ("uplift_", "contact_uplift"),
+    "pressure at the low end": ("pressure_low_",),
+    "pressure at the high end": ("pressure_high_", "contact_max_pressure"),
+    "moment": ("M_",),
+    "moment of a support": ("reaction_M",),
+    "force of a support along x": ("reaction_x_",),
+    "force of a support along y": ("reaction_y_",),
+    "force of a support along z": ("reaction_z_",),
+    "shear force of a section": ("V_",),
+    "rocking": ("theta_",),
+    "racking": ("racking_",),
+    "displacement along x": ("u_x_",),
+    "displacement along y": ("u_y_",),
+    "displacement along z": ("u_z_",),
 }
 # Rows of the table of results: what they are called -> beginnings of columns.
 RESULTS = {

@@ -121,7 +121,7 @@ def sections_of(
         _describe_motion(run, model),
         _tabulate_results(run, numbers),
         _compare_accelerations(run),
-        Section("Histories", charts=histories, drawings=list_maps(run)),
+        Section("Histories", charts=histories, drawings=list_maps(run, model)),
         _explain_certificate(run),
         _tabulate_peaks(run, numbers),
     ]
