@@ -37,7 +37,7 @@ FIRST_PERIOD = 0.02  # s, of a spectrum: 50 Hz, beyond which engineers ask for n
 LOW_PASS = 25.0
 STEPS_A_PERIOD = 5
 CURVES = 8  # of probes in an overview: beyond, nobody tells them apart
-# What varies by less than this part of the largest curve of an axis has an axis of its own.
+# What is never larger than this part of the largest curve of an axis has an axis of its own.
 SEEN = 0.1
 TITLE_PAD = 3.0  # points, between a legend and the title above it
 Run = Any  # a Solution, or a RunFolder, which needs h5py
@@ -126,7 +126,7 @@ def chart_histories(
 
     Returns:
         charts for every title whose columns move; of these, those with the unit of the first. What
-        varies by less than a tenth of the largest of them has a chart of its own.
+        is never larger than a tenth of the largest of them has a chart of its own.
     """
     charts = []
     for title, prefixes in groups.items():
@@ -151,13 +151,13 @@ def _chart_sizes(
 
     Largest come first. Titles of charts that stand apart name what is on them.
     """
+    sizes = {name: float(np.nanmax(np.abs(run.history[name]))) for name in names}
     groups: list[list[str]] = []
     largest = 0.0
-    for name in names:
-        extent = _find_range(run, name)
-        if not groups or extent < SEEN * largest:
+    for name in sorted(names, key=lambda name: -sizes[name]):
+        if not groups or sizes[name] < SEEN * largest:
             groups.append([])
-            largest = extent
+            largest = sizes[name]
         groups[-1].append(name)
     if len(groups) == 1:
         return [chart_columns(run, names, title, choose_unit)]
@@ -337,6 +337,9 @@ def draw_chart(axis: Any, chart: Chart) -> None:
         axis.set_yscale("log")
         # powers of ten are formulas, which the page does not read
         axis.yaxis.set_major_formatter("{x:.0e}")
+    elif not chart.log_y:
+        # The number that matplotlib would take off all ticks stands where the legend is.
+        axis.ticklabel_format(axis="y", useOffset=False)
     if chart.bound is not None:
         label = f"tolerance {chart.bound:g}"
         axis.axhline(chart.bound, color="tab:red", ls="--", lw=0.8, label=label)
