@@ -22,7 +22,7 @@ from vi_contact.practice.cli.entry import main
 from vi_contact.practice.engineering import first_modes
 from vi_contact.practice.ground_motion.record import Record
 from vi_contact.practice.studies import read_case
-from vi_contact.practice.studies.cases.description import describe
+from vi_contact.practice.studies.cases.description.model import describe
 from vi_contact.run.damping import describe_damping
 
 COMM = MPI.COMM_WORLD

@@ -19,7 +19,8 @@ from vi_contact import beam, layer
 from vi_contact.core.errors import InputError
 from vi_contact.practice.cli.entry import main
 from vi_contact.practice.studies import read_case, refine, report
-from vi_contact.practice.studies.cases.description import describe, put_in_words
+from vi_contact.practice.studies.cases.description.model import describe
+from vi_contact.practice.studies.cases.description.words import put_in_words
 from vi_contact.practice.studies.cases.library import locate
 
 pytestmark = pytest.mark.serial

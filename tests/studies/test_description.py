@@ -19,7 +19,9 @@ import vi_contact as vc
 from vi_contact.practice.cli.entry import main
 from vi_contact.practice.plots.sketch import sketch
 from vi_contact.practice.studies import read_case
-from vi_contact.practice.studies.cases.description import _find_warnings, describe, put_in_words
+from vi_contact.practice.studies.cases.description.doubts import find_warnings
+from vi_contact.practice.studies.cases.description.model import describe
+from vi_contact.practice.studies.cases.description.words import put_in_words
 
 COMM = MPI.COMM_WORLD
 HEIGHT, CELLS, E, RHO = 4.0, 16, 1.8e9, 2000.0
@@ -450,7 +452,7 @@ def test_steps_are_compared_with_periods_of_open_contact(shared_tmp: Path) -> No
         model["run"]["dt"] = dt * model["periods_open"][0] / 20.0
         said = [
             one
-            for one in _find_warnings(model)
+            for one in find_warnings(model)
             if "first natural period with the contact open" in one
         ]
         assert len(said) == count

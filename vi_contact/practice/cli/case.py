@@ -254,7 +254,8 @@ def _check_model(case: "Case", comm: Any, folder: Path) -> str:
     from ...run.files.folder import is_marked, run_folder
     from ..plots.histories import write_picture  # late: matplotlib
     from ..plots.sketch import sketch
-    from ..studies.cases.description import describe, put_in_words, write_model
+    from ..studies.cases.description.model import describe, write_model
+    from ..studies.cases.description.words import put_in_words
 
     case.check()
     parts = case.parts(comm)

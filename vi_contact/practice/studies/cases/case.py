@@ -281,7 +281,7 @@ class Case:
             folder: of the run; None: without.
         """
         if folder is not None:
-            from .description import FEW, describe, write_model  # late: it reads cases
+            from .description.model import FEW, describe, write_model  # late: it reads cases
 
             write_model(parts.system.algebra.comm, describe(self, comm, parts, most=FEW), folder)
 
