@@ -61,12 +61,20 @@ def describe_contact(
             "name": node.arguments.get("name") or " on ".join(groups),
             "points": int(b - a),
             "size": float(whole.weights[a:b].sum()),
+            "gaps": _find_gaps(whole.gap0[a:b]),
+            "held": bool(node.arguments.get("held", False)),
             "friction": repr(problem.friction),
             "nodes": "" if census is None else census.in_words(),
             "places": whole.points[a:b],
             "others": {} if census is None else census.places,
             "sides": _describe_sides(problem.system.space, tags, groups, whole.points[a:b]),
         }
+
+
+def _find_gaps(gaps: Array) -> list[float]:
+    """Return the least and the largest finite gap of points [m]; [] without any."""
+    finite = gaps[np.isfinite(gaps)]
+    return [float(finite.min()), float(finite.max())] if len(finite) else []
 
 
 def describe_contact_point(body: Body, problem: ContactProblem) -> dict[str, Any]:

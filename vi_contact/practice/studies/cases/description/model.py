@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from .....core.algebra import Comm
+from .....core.algebra import Comm, largest, max_abs
 from .....core.files import on_root, to_json, write_atomically
 from .....core.problem import ContactProblem
 from .....run.damping import NOT_COMPUTED, describe_damping, first_modes, first_open_period
@@ -20,8 +20,16 @@ from ..unread_choices import find_left_over
 from ..vocabulary import Parts
 from .bodies import describe_meshed_body, describe_waves, select_keys
 from .conditions import describe_contact, describe_contact_point, describe_layer
+from .design_spectra import find_design_spectrum
 from .doubts import ROUNDED, find_defects, find_warnings
-from .motions import describe_records
+from .loads import describe_body_loads, describe_gravity, describe_loads, sum_up
+from .motions import (
+    describe_design_spectrum,
+    describe_excitations,
+    describe_records,
+    list_motions,
+)
+from .surroundings import describe_sides
 
 # unknowns: up to so many a run tells its periods, which take two seconds; more when it is checked
 FEW = 10_000
@@ -43,27 +51,7 @@ def describe(
         most: unknowns beyond which periods are left out.
 
     Returns:
-        Tables and lists of tables; [..] are units.
-
-        - title, dimension, unknowns, degree (of a body with elements), mass [kg];
-        - groups: name, kind;
-        - bodies: name, cells, mass [kg], material;
-        - supports: kind, groups, components;
-        - contact: name, points, size [m²], friction, nodes: a sentence, places, others: kind ->
-          places, sides: name, h [m] and G [Pa] of both; of a body without mesh gap [m] in the place
-          of a size;
-        - layers: width [m], speed [m/s], passage: their quotient [s];
-        - periods [s], damping_ratios of their modes and rigid_motions with the contact closed where
-          it touches at the start, and sticking where there is friction; periods_open, the first one
-          with it open, where it touches;
-        - damping: in words, "none" without;
-        - waves: body, c_s [m/s], h: the longest edge over the degree [m], f_max = c_s / (8 h) [Hz],
-          dt_ratio = dt c_s / h;
-        - records: file, scale, dt [s], duration [s], pga [m/s²], f_95 [Hz]: 95 % of its energy are
-          below;
-        - run: dt [s], t_end [s], steps;
-        - outline: group, lines; on rank 0;
-        - defects and warnings: sentences.
+        Tables and lists of tables; docs/reference/files.md says what is in them.
 
     Raises:
         InputError: as of a run.
@@ -72,38 +60,83 @@ def describe(
     problem = case.problem(comm, parts)
     plan = case.plan(parts)
     tags = parts.tags or {}
-    if case.body is None:
-        body = describe_meshed_body(problem, tags)
-        contact = list(describe_contact(case, problem, tags))
-    else:
-        body = case.body.description
-        contact = [describe_contact_point(case.body, problem)]
+    has_mesh = case.body is None
+    body = describe_meshed_body(problem, tags) if has_mesh else case.body.description
     run = {"dt": plan.dt(0), "t_end": plan.length, "steps": plan.steps}
-    degree = {"degree": body["degree"]} if "degree" in body else {}
-    model = {
+    model: dict[str, Any] = {
         "title": case.tables.get("title") or case.path.stem,
         "dimension": problem.system.space.dimension,
         "unknowns": problem.system.space.unknowns,
-        **degree,
+        **{key: body[key] for key in ("degree", "section", "box") if key in body},
         "mass": body["mass"],
         "groups": [
             {"name": name, "kind": type(group).__name__.lower()} for name, group in tags.items()
         ],
         "bodies": [select_keys(part) for part in body["bodies"]],
         "supports": body["supports"],
-        "contact": contact,
         "layers": [] if case.layer is None else [describe_layer(case.layer)],
         "waves": [describe_waves(part, run["dt"]) for part in body["bodies"] if "c_s" in part],
-        "records": describe_records(case, parts.system),
         "run": run,
         "outline": body["outline"],
-    } | _describe_modes(case, problem, most)
-
+    }
+    model |= _describe_contact(case, problem, tags)
+    model |= _describe_actions(case, problem, tags, run["t_end"])
+    model |= _describe_motions(case, parts)
+    model |= _describe_modes(case, problem, most)
+    model["sides"] = describe_sides(model)
     _add_findings(model, case, problem, plan)
 
     # Plain values, rounded: digits beyond depend on the number of ranks.
     text = to_json(model)
     return dict(json.loads(text, parse_float=lambda digits: float(f"{float(digits):.{DIGITS}g}")))
+
+
+def _describe_contact(case: Any, problem: ContactProblem, tags: Any) -> dict[str, Any]:
+    """Return the parts of the contact; collective."""
+    if case.body is None:
+        return {"contact": list(describe_contact(case, problem, tags))}
+    return {"contact": [describe_contact_point(case.body, problem)]}
+
+
+def _describe_actions(
+    case: Any, problem: ContactProblem, tags: Any, t_end: float
+) -> dict[str, Any]:
+    """Return gravity, loads with their resultants, and motions at the start; collective.
+
+    Args:
+        case: a ``Case``.
+        problem: its problem.
+        tags: groups of the mesh.
+        t_end: when the run ends [s].
+    """
+    system = problem.system
+    d = system.space.dimension
+    if case.body is None:
+        loads = describe_loads(case, problem, tags, t_end=t_end)
+    else:
+        loads = describe_body_loads(case, t_end=t_end)
+    comm = system.algebra.comm
+    return {
+        "gravity": describe_gravity(case, d),
+        "loads": loads,
+        "constant_loads": sum_up(loads, d),
+        "start": {
+            "displacement": largest(comm, max_abs(system.u0)),
+            "velocity": largest(comm, max_abs(system.v0)),
+        },
+    }
+
+
+def _describe_motions(case: Any, parts: Parts) -> dict[str, Any]:
+    """Return records and other excitations, and the design spectrum of the case."""
+    design = find_design_spectrum(case)
+    motions = list_motions(case, parts.system)
+    return {
+        "records": describe_records(motions, design),
+        "excitations": describe_excitations(motions),
+        "design_spectrum": describe_design_spectrum(design),
+        "waves_come_in": bool(parts.system.absolute),
+    }
 
 
 def _add_findings(
