@@ -24,6 +24,8 @@ from ..plots.pages import write_pages
 from ..plots.sections import HEADERS, Section, Table, format_number, header_facts, sections_of
 from ..plots.sketch import sketch
 from ..plots.web_page import MISSING, can_write, write_web_page
+from ..units.report_units import ReportUnits
+from .cases.description.tables import input_tables
 from .cases.library import COPY, read_copy
 from .cases.parsing import Words, read
 from .cases.table_calls import Spot, build, make_callee
@@ -67,8 +69,8 @@ def report(
     pages = _choose_pages(folder, out)
 
     # The sections: what the run has told, and before the last two of them what is known beside it.
-    model, sketches = _draw_model(folder, pages[0].with_name("model.png"))
-    sections = sections_of(run, model, columns)
+    model, inputs, sketches = _read_model(folder, pages[0].with_name("model.png"))
+    sections = sections_of(run, model, columns, inputs=inputs)
     pictures = draw_run(run, pages[0].parent, title=heading)
     if model:
         sections[0] = replace(sections[0], pictures=sketches)
@@ -98,12 +100,13 @@ def _choose_pages(folder: Path, out: str | Path | None) -> list[Path]:
     return [page]
 
 
-def _draw_model(folder: Path, picture: Path) -> tuple[dict[str, Any], list[Path]]:
-    """Return what model.json says, and its sketch; nothing where there is none."""
+def _read_model(folder: Path, picture: Path) -> tuple[dict[str, Any], list[Table], list[Path]]:
+    """Return what model.json says, in tables too, and its sketch; nothing where there is none."""
     if not is_own(folder / MODEL):
-        return {}, []
+        return {}, [], []
     try:
         model = read_object(folder / MODEL)
+        inputs = input_tables(model, ReportUnits())
         image = render_image(sketch(model), bbox_inches="tight")
     except InputError:
         raise
@@ -116,7 +119,7 @@ def _draw_model(folder: Path, picture: Path) -> tuple[dict[str, Any], list[Path]
             f"'{folder / MODEL}' is damaged ({reason}): restore it, or delete it"
         ) from error
     write_output(picture, image)
-    return model, [picture]
+    return model, inputs, [picture]
 
 
 @check_arguments

@@ -59,8 +59,8 @@ def find_warnings(model: Mapping[str, Any]) -> Iterator[str]:
 def _find_odd_bodies(model: Mapping[str, Any]) -> Iterator[str]:
     """Tell of stiffness, thickness and periods that look like a mistaken unit."""
     for body in model["bodies"]:
-        material = body["material"] if isinstance(body["material"], Mapping) else {}
-        for name in ("E", "E1", "E2", "E3"):
+        material = body["material"]
+        for name in ("E", "E1", "E2", "E3") if "shear_modulus" in body else ():
             if name in material and material[name] < SOFTEST:
                 yield (
                     f"'{body['name']}' has {name} = {material[name]:g} Pa, less than any soil: "

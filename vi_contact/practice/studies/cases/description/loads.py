@@ -16,6 +16,7 @@ from ..expressions import Expression, Places
 from ..table_calls import Call, Group, build, walk_nodes
 from .bodies import name_body
 
+FORCES = ("N", "N/m")  # units of what acts on a body without a mesh
 PLACES = 11  # of a part of a resultant, relative to the whole
 TIMES = 2001  # of a run at which the factor of a load is looked at, for its largest value
 
@@ -89,17 +90,26 @@ def describe_body_loads(case: Any, *, t_end: float) -> list[dict[str, Any]]:
         case: a ``Case`` with [beam] or [particle].
         t_end: when the run ends [s].
     """
-    call = case.nodes[find_body_table(case.nodes)]
+    calls = walk_nodes(case.nodes[find_body_table(case.nodes)])
     loads = []
+    for call in calls:
+        if isinstance(call, Call):
+            loads += list(_describe_forces(call, t_end))
+    return loads
+
+
+def _describe_forces(call: Call, t_end: float) -> Iterator[dict[str, Any]]:
+    """Yield the arguments of a call that are forces, as functions of the time."""
     for name, node in call.arguments.items():
         unit = call.callee.quantities[name].unit
-        if callable(node) and not isinstance(node, Call) and unit is not None:
-            text = _describe_history(node, t_end)
-            value = float(node(0.0))
-            loads.append(
-                {"name": name, "kind": "force", "value": value, "unit": unit.symbol, "varies": text}
-            )
-    return loads
+        if isinstance(node, Expression) and unit is not None and unit.symbol in FORCES:
+            yield {
+                "name": name,
+                "kind": "force",
+                "value": float(node(0.0)),
+                "unit": unit.symbol,
+                "varies": _describe_history(node, t_end) if "t" in node.used else "",
+            }
 
 
 def _without_groups(call: Call) -> dict[str, Any]:

@@ -77,6 +77,7 @@ def describe(
         "layers": [] if case.layer is None else [describe_layer(case.layer)],
         "waves": [describe_waves(part, run["dt"]) for part in body["bodies"] if "c_s" in part],
         "run": run,
+        "method": case.describe_method(problem),
         "outline": body["outline"],
     }
     model |= _describe_contact(case, problem, tags)

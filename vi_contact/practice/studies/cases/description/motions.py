@@ -63,8 +63,9 @@ def describe_excitations(motions: list[Any]) -> list[dict[str, Any]]:
             continue
         numbers = []
         for name, quantity in _read_quantities(type(motion)).items():
-            value = getattr(motion, name, None)
-            if isinstance(value, int | float) and not isinstance(value, bool):
+            value: Any = getattr(motion, name, None)
+            is_number = isinstance(value, int | float) and not isinstance(value, bool)
+            if is_number and np.isfinite(value):
                 unit = "-" if quantity.unit is None else quantity.unit.symbol.replace("1", "-")
                 numbers.append({"name": name, "value": float(value), "unit": unit})
         description = {
