@@ -171,8 +171,10 @@ def test_the_command_tells_and_draws(tmp_path: Path, capsys: pytest.CaptureFixtu
     printed = capsys.readouterr().out
     assert {path.name for path in out.iterdir()} == {"model.json", "model.png"}
     model = json.loads((out / "model.json").read_text("utf-8"))
-    assert printed.startswith(put_in_words(model)) and printed.endswith("the file is in order\n")
-    assert "  upper_bottom on lower_top: 2 points on 0.25 m²; Coulomb(mu=0.5)\n" in printed
+    assert printed.startswith(put_in_words(model))
+    assert printed.endswith("the file is in order; 1 doubt about the model\n")
+    assert re.search(r"  upper_bottom on lower_top: area +0\.25  m²\n", printed)
+    assert re.search(r"  upper_bottom on lower_top: friction +mu = 0\.5 +Coulomb\n", printed)
     assert (out / "model.png").read_bytes()[:4] == b"\x89PNG"
 
 
@@ -222,7 +224,7 @@ def test_the_page_shows_what_the_command_tells(
     assert main(["run", "channel", "--check", "--quiet"]) == 0
     *told, last = capsys.readouterr().out.splitlines()
     assert told == shown.splitlines() and last.endswith(
-        "A channel buried in soil, shaken: the file is in order"
+        "A channel buried in soil, shaken: the file is in order; 1 doubt about the model"
     )
 
 
@@ -346,6 +348,7 @@ def test_warnings_name_what_is_coarse(tmp_path: Path) -> None:
     """Edges too long for the record's energy, and steps longer than a twentieth of the first
     period."""
     soft = described(written(tmp_path, BLOCKS.replace("E = 1.8e9", "E = 1.8e4")))
+    assert "the first natural period is 30.42 s" in soft["warnings"].pop(0)
     assert [one.split()[0] for one in soft["warnings"]] == ["'lower'", "'upper'"]
     assert (
         np.sqrt(0.5 * 1.8e4 / RHO) / 2.0 == pytest.approx(1.06, rel=1e-2)
@@ -395,7 +398,7 @@ def test_contact_nodes_are_counted_and_placed(shared_tmp: Path) -> None:
         "(3.07692, 6) and 4 more places; 1 node partly covered (carried by their neighbours), at "
         "(15.3846, 6)"
     )
-    assert f"  base: {contact['nodes']}" in put_in_words(model)
+    assert f"  {contact['nodes']}\n" in put_in_words(model)
     assert {kind: len(places) for kind, places in contact["others"].items()} == {
         "in front of nothing": 7,
         "partly covered": 1,

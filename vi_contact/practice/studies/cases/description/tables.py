@@ -287,7 +287,8 @@ def _list_resultant(name: str, load: Mapping[str, Any], pen: _Pen) -> Iterator[R
             f"{name}: point of attack", load["point"], "m", remark, quantity="size"
         )
     if load.get("moment"):
-        about = "about the origin" if len(load["moment"]) > 1 else "about the origin, x to y"
+        in_plane = len(load["moment"]) == 1
+        about = "about the origin, counter-clockwise" if in_plane else "about the origin"
         yield pen.row_of_several(f"{name}: moment", load["moment"], "N m", about, quantity="moment")
 
 
@@ -415,8 +416,10 @@ def _list_damping(model: Model, pen: _Pen) -> Iterator[Row]:
     periods = model.get("periods") or []
     ratios = model.get("damping_ratios") or []
     for number, period in enumerate(periods, start=1):
-        ratio = ratios[number - 1] if number <= len(ratios) else 0.0
-        share = f"damping {write_number(100.0 * ratio)} %" if ratio else "no damping"
+        share = ""
+        if number <= len(ratios):
+            ratio = ratios[number - 1]
+            share = f"damping {write_number(100.0 * ratio)} %" if ratio else "no damping"
         yield pen.row(f"natural period T{number}, contact closed", period, "s", share)
     for period in model.get("periods_open") or []:
         yield pen.row("natural period T1, contact open", period, "s")
