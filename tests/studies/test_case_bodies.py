@@ -206,7 +206,7 @@ def test_check_describes_a_beam(tmp_path, capsys):
     assert ["tip:", "friction", "mu", "=", "0.3", "Coulomb"] in lines
     assert ["beam:", "mass", "0.005", "t", "200", "cells"] in lines
     assert ["start", "clamped", "along", "x,", "y"] in lines
-    assert lines[22][:7] == ["body_force", "20", "N/m", "20", "at", "the", "start,"]
+    assert ["body_force", "20", "N/m", "20", "at", "the", "start,"] in [one[:7] for one in lines]
     assert (tmp_path / "run" / "model.png").stat().st_size > 0
     model = describe(read_case(locate("beam"), SMALL), COMM)
     # of the clamped rod, c = 10 m/s: 4 l/c

@@ -161,7 +161,7 @@ def test_materials_sides_and_damping_by_hand(shared_tmp: Path) -> None:
     for number, period in enumerate(model["periods"][:2], start=1):
         w = 2.0 * np.pi / period
         percent = 100.0 * (0.5 / (2.0 * w) + 2e-4 * w / 2.0)
-        told, unit, _ = rows[f"upper: damping ratio at T{number} by alpha and beta"]
+        told, unit, _ = rows[f"lower, upper: damping ratio at T{number} by alpha and beta"]
         assert float(told) == pytest.approx(percent, rel=1e-3) and unit == "%"
         assert 100.0 * model["damping_ratios"][number - 1] == pytest.approx(percent, rel=1e-3)
     bare = rows_of(described(shared_tmp, "system.damping="))

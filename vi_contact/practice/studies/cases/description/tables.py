@@ -4,7 +4,6 @@
 """
 
 import math
-import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from textwrap import shorten
@@ -41,7 +40,6 @@ NUMBERS = {
     "gap": ("gap", "m", "length"),
 }
 SECTIONS = {"PlaneStrain": "plane strain", "PlaneStress": "plane stress", "Solid": "solid"}
-_CALL = re.compile(r"(\w+)\((.*)\)")  # how laws are written: Coulomb(mu=0.5)
 
 
 @dataclass(frozen=True)
@@ -322,10 +320,10 @@ def _list_contact(model: Model, pen: _Pen) -> Iterator[Row]:
 
 def _write_friction(name: str, friction: Any) -> Row:
     """Return the row of a law of friction, such as Coulomb(mu=0.5)."""
-    match = _CALL.fullmatch(str(friction))
-    if match is None:
+    law, opened, rest = str(friction).partition("(")
+    if not opened:
         return _say(f"{name}: friction", friction)
-    law, arguments = match.groups()
+    arguments = rest.removesuffix(")")
     if law == "Frictionless":
         return _say(f"{name}: friction", "none")
     return _say(f"{name}: friction", arguments.replace("=", " = ") or law, law)
@@ -412,7 +410,9 @@ def _set_beside(design: Mapping[str, Any], wanted: float | None, value: float, p
 def _list_damping(model: Model, pen: _Pen) -> Iterator[Row]:
     """Yield the law, its coefficients, and the damping ratio of each of the first modes."""
     if "damping" in model:
-        yield _say("law", str(model["damping"]).partition(";")[0])
+        # the ratios of the modes stand beside the periods below
+        sources = [text for text in str(model["damping"]).split("; ") if " at T1 = " not in text]
+        yield _say("law", "; ".join(sources))
     periods = model.get("periods") or []
     ratios = model.get("damping_ratios") or []
     for number, period in enumerate(periods, start=1):
@@ -425,23 +425,38 @@ def _list_damping(model: Model, pen: _Pen) -> Iterator[Row]:
         yield pen.row("natural period T1, contact open", period, "s")
     if "rigid_motions" in model:
         yield _say("rigid motions that are left", model["rigid_motions"])
+    alike: dict[tuple[Any, Any], list[str]] = {}
     for body in _list_objects(model, "bodies"):
-        yield from _list_rayleigh(body, periods, pen)
+        factors = (tuple(body.get("alpha") or (0.0,)), tuple(body.get("beta") or (0.0,)))
+        alike.setdefault(factors, []).append(str(body.get("name")))
+    for (alpha, beta), names in alike.items():
+        if any(alpha) or any(beta):
+            yield from _list_rayleigh(", ".join(names), (alpha, beta), periods, pen)
 
 
-def _list_rayleigh(body: Mapping[str, Any], periods: Sequence[float], pen: _Pen) -> Iterator[Row]:
-    """Yield alpha and beta of C = alpha M + beta K in a body, and their ratios at T1 and T2."""
-    alpha = body.get("alpha") or [0.0, 0.0]
-    beta = body.get("beta") or [0.0, 0.0]
-    if not (any(alpha) or any(beta)):
-        return
-    name = body["name"]
+def _list_rayleigh(
+    name: str,
+    factors: tuple[Sequence[float], Sequence[float]],
+    periods: Sequence[float],
+    pen: _Pen,
+) -> Iterator[Row]:
+    """Yield alpha and beta of C = alpha M + beta K, and the ratios that they give at T1 and T2.
+
+    Args:
+        name: of the bodies.
+        factors: least and largest alpha [1/s], and the like of beta [s].
+        periods: natural ones [s].
+        pen: writes.
+    """
+    alpha, beta = factors
     yield pen.row_of_range(f"{name}: alpha of the mass", alpha, "1/s")
     yield pen.row_of_range(f"{name}: beta of the stiffness", beta, "s")
     for number, period in enumerate(periods[:2], start=1):
         # xi = alpha / (2 w) + beta w / 2 with w = 2 pi / T
-        half = math.pi / period
-        ratios = [100.0 * (a / (4.0 * half) + b * half) for a, b in zip(alpha, beta, strict=True)]
+        w = 2.0 * math.pi / period
+        ratios = []
+        for mass, stiffness in zip(alpha, beta, strict=True):
+            ratios.append(100.0 * (mass / (2.0 * w) + stiffness * w / 2.0))
         yield pen.row_of_range(f"{name}: damping ratio at T{number} by alpha and beta", ratios, "%")
 
 
