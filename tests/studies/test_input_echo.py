@@ -339,16 +339,38 @@ method = {type = "TaoTron"}
 """
 
 
+STAGES = """
+[[stage]]
+name = "rest"
+type = "static"
+[[stage]]
+name = "quake"
+type = "dynamic"
+[[stage]]
+name = "after"
+type = "dynamic"
+run = {steps = 1}
+[[stage.record]]
+type = "Probe"
+points = {top = [8.0, 16.0]}
+[[stage.record]]
+type = "Probe"
+points = {top = [9.0, 16.0]}
+"""
+
+
 @pytest.mark.serial
 @pytest.mark.parametrize(
     ("text", "settings", "said"),
     [
+        (DAM + STAGES, [], "two recorders have the column"),
+        (DAM + STAGES, ["friction="], "has no static equilibrium"),
         (DAM + TWICE, [], "two recorders have the column"),
         (DAM + CUT, ["system.degree=2"], "cuts cells of degree 2"),
         (DAM + ESCALATION, [], "only enforces bounds on displacements"),
         (DAM, ["friction="], "has no static equilibrium"),
     ],
-    ids=["columns", "degree", "escalation", "rest"],
+    ids=["stage", "first stage", "columns", "degree", "escalation", "rest"],
 )
 def test_the_check_refuses_what_the_run_refuses(
     tmp_path: Path,
@@ -357,7 +379,7 @@ def test_the_check_refuses_what_the_run_refuses(
     settings: list[str],
     said: str,
 ) -> None:
-    """In the same sentence, and with no file of a run."""
+    """In the same sentence, and with no file of a run; a later stage is refused beforehand."""
     out = tmp_path / "out"
     command = ["run", str(written(tmp_path, text)), "--quiet", "--out", str(out)]
     for setting in settings:

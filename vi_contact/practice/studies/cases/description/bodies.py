@@ -39,7 +39,11 @@ def describe_waves(part: Mapping[str, Any], dt: float) -> dict[str, Any]:
 def describe_meshed_body(problem: ContactProblem, tags: Mapping[str, Any]) -> dict[str, Any]:
     """Return what is told of bodies with a mesh, as ``Body.description`` has it of others."""
     space = space_of("describe", problem.system)
-    bodies = [_describe_body(space, tags, *material) for material in space.forms.materials]
+    measured = measure_cells(space.mesh)
+    bodies = [
+        _describe_body(space, tags, measured, cells, material)
+        for cells, material in space.forms.materials
+    ]
     section = space.forms.section
     return {
         "degree": space.degree,
@@ -71,7 +75,7 @@ def name_body(space: Any, tags: Mapping[str, Any], cells: Any) -> str:
 
 
 def _describe_body(
-    space: Any, tags: Mapping[str, Any], cells: Any, material: Any
+    space: Any, tags: Mapping[str, Any], measured: tuple[Array, Array], cells: Any, material: Any
 ) -> dict[str, Any]:
     """Return what is made of one material; collective.
 
@@ -81,10 +85,11 @@ def _describe_body(
     Args:
         space: of the body.
         tags: groups of the mesh.
+        measured: sizes and centroids of the owned cells.
         cells: of the material, ghosts among them.
         material: the material.
     """
-    sizes, centroids = measure_cells(space.mesh)
+    sizes, centroids = measured
     owned = cells[cells < len(sizes)]
     thickness = space.forms.section.thickness
     fields = ("rho", "shear", "alpha_rho")
