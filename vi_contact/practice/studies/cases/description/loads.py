@@ -9,7 +9,7 @@ from .....core.algebra import Array, total
 from .....core.problem import ContactProblem
 from .....core.units import STANDARD_GRAVITY
 from .....fem.body.initial_strains import InitialStrain
-from .....fem.output.load_resultants import find_point, sum_up_load
+from .....fem.output.load_resultants import NOTHING, find_point, sum_up_load
 from .....fem.output.sizes import measure_cells
 from ..bodies import find_body_table
 from ..expressions import Expression, Places
@@ -214,22 +214,34 @@ def _describe_history(history: Any, t_end: float) -> str:
     return f"{values[0]:.4g} at the start, at most {values[row]:.4g} at t = {times[row]:.4g} s"
 
 
-def sum_up(loads: list[dict[str, Any]], dimension: int) -> dict[str, Any]:
-    """Return the resultant of all constant loads together, with its line of action.
+def sum_up(model: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the resultant of all constant loads together; {} for less than two.
+
+    Its point is where the line of action cuts the lowest level of the structure, or of the model
+    where nothing stands in a ground: its distance from the middle of a base is the eccentricity.
 
     Args:
-        loads: as of ``describe_loads``.
-        dimension: of the model.
+        model: with the keys dimension, box, loads and sides of model.json.
+
+    Returns:
+        force [N], moment about the origin [N m], point [m] and level [m]; the last two are None for
+        a couple, and on a line.
     """
-    constant = [load for load in loads if load.get("force") and not load["varies"]]
-    if len(constant) < 2:
+    loads = [load for load in model["loads"] if load.get("force") and not load["varies"]]
+    if len(loads) < 2:
         return {}
-    force = np.sum([load["force"] for load in constant], axis=0)
-    moment = np.sum([load["moment"] for load in constant], axis=0)
-    sizes = sum(float(np.linalg.norm(load["force"])) for load in constant)
-    point = None
-    if np.linalg.norm(force) > 1e-9 * sizes:
-        first = constant[0]["centroid"]
-        found = find_point(force, moment, near=np.zeros(dimension) if first is None else first)
-        point = None if found is None else found.tolist()
-    return {"force": force.tolist(), "moment": np.atleast_1d(moment).tolist(), "point": point}
+    d = model["dimension"]
+    force = np.sum([load["force"] for load in loads], axis=0)
+    moment = np.sum([load["moment"] for load in loads], axis=0)
+    sizes = sum(float(np.linalg.norm(load["force"])) for load in loads)
+    told: dict[str, Any] = {"force": force.tolist(), "moment": np.atleast_1d(moment).tolist()}
+    told |= {"point": None, "level": None}
+    if d == 1 or np.linalg.norm(force) <= NOTHING * sizes:
+        return told
+
+    # The point of this level below the middle of the model is one of the plane.
+    box = model["box"]
+    near = 0.5 * (np.array(box["min"]) + np.array(box["max"]))
+    near[-1] = model["sides"].get("foot", box["min"][-1])
+    found = find_point(force, moment, near=near, normal=np.eye(d)[-1])
+    return told | {"point": None if found is None else found.tolist(), "level": float(near[-1])}

@@ -85,6 +85,7 @@ def describe(
     model |= _describe_motions(case, parts)
     model |= _describe_modes(case, problem, most)
     model["sides"] = describe_sides(model)
+    model["constant_loads"] = sum_up(model)
     _add_findings(model, case, problem, plan)
 
     # Plain values, rounded: digits beyond depend on the number of ranks.
@@ -111,16 +112,14 @@ def _describe_actions(
         t_end: when the run ends [s].
     """
     system = problem.system
-    d = system.space.dimension
     if case.body is None:
         loads = describe_loads(case, problem, tags, t_end=t_end)
     else:
         loads = describe_body_loads(case, t_end=t_end)
     comm = system.algebra.comm
     return {
-        "gravity": describe_gravity(case, d),
+        "gravity": describe_gravity(case, system.space.dimension),
         "loads": loads,
-        "constant_loads": sum_up(loads, d),
         "start": {
             "displacement": largest(comm, max_abs(system.u0)),
             "velocity": largest(comm, max_abs(system.v0)),

@@ -21,9 +21,10 @@ def describe_sides(model: Mapping[str, Any]) -> dict[str, Any]:
         model: with the keys box, bodies, waves and records of model.json.
 
     Returns:
-        structure: names; width: of it along the axis where it is widest [m]; ground: name of the
-        slowest body around it; wave_length [m] and period [s] of its waves, None without a record;
-        distances: side, distance [m], widths, wave_lengths (None without a record).
+        structure: names; width: of it along the axis where it is widest [m]; foot: its lowest level
+        [m]; ground: name of the slowest body around it; wave_length [m] and period [s] of its
+        waves, None without a record; distances: side, distance [m], widths, wave_lengths (None
+        without a record).
     """
     if "box" not in model or model["dimension"] == 1:
         return {}
@@ -60,6 +61,7 @@ def describe_sides(model: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "structure": [body["name"] for body in inside],
         "width": width,
+        "foot": low[-1],
         "ground": slowest["body"],
         "period": max(periods) if periods else None,
         "wave_length": length,

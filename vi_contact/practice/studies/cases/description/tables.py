@@ -279,8 +279,9 @@ def _list_resultant(name: str, load: Mapping[str, Any], pen: _Pen) -> Iterator[R
     """Yield the rows of a resultant."""
     yield pen.row_of_several(f"{name}: resultant", load["force"], "N", load.get("varies", ""))
     if load.get("point") is not None:
-        kind = load.get("kind")
-        remark = "centre of mass" if kind == "weight" else "on its line of action"
+        remark = "centre of mass" if load.get("kind") == "weight" else "on its line of action"
+        if load.get("level") is not None:
+            remark = "where its line of action cuts the foot of the structure, or of the model"
         yield pen.row_of_several(
             f"{name}: point of attack", load["point"], "m", remark, quantity="size"
         )
