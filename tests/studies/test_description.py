@@ -19,7 +19,9 @@ import vi_contact as vc
 from vi_contact.practice.cli.entry import main
 from vi_contact.practice.plots.sketch import sketch
 from vi_contact.practice.studies import read_case
-from vi_contact.practice.studies.cases.description import _find_warnings, describe, put_in_words
+from vi_contact.practice.studies.cases.description.doubts import find_warnings
+from vi_contact.practice.studies.cases.description.model import describe
+from vi_contact.practice.studies.cases.description.words import put_in_words
 
 COMM = MPI.COMM_WORLD
 HEIGHT, CELLS, E, RHO = 4.0, 16, 1.8e9, 2000.0
@@ -169,8 +171,10 @@ def test_the_command_tells_and_draws(tmp_path: Path, capsys: pytest.CaptureFixtu
     printed = capsys.readouterr().out
     assert {path.name for path in out.iterdir()} == {"model.json", "model.png"}
     model = json.loads((out / "model.json").read_text("utf-8"))
-    assert printed.startswith(put_in_words(model)) and printed.endswith("the file is in order\n")
-    assert "  upper_bottom on lower_top: 2 points on 0.25 m²; Coulomb(mu=0.5)\n" in printed
+    assert printed.startswith(put_in_words(model))
+    assert printed.endswith("the file is in order; 1 doubt about the model\n")
+    assert re.search(r"  upper_bottom on lower_top: area +0\.25  m²\n", printed)
+    assert re.search(r"  upper_bottom on lower_top: friction +mu = 0\.5 +Coulomb\n", printed)
     assert (out / "model.png").read_bytes()[:4] == b"\x89PNG"
 
 
@@ -220,7 +224,7 @@ def test_the_page_shows_what_the_command_tells(
     assert main(["run", "channel", "--check", "--quiet"]) == 0
     *told, last = capsys.readouterr().out.splitlines()
     assert told == shown.splitlines() and last.endswith(
-        "A channel buried in soil, shaken: the file is in order"
+        "A channel buried in soil, shaken: the file is in order; 1 doubt about the model"
     )
 
 
@@ -345,6 +349,7 @@ def test_warnings_name_what_is_coarse(tmp_path: Path) -> None:
     """Edges too long for the record's energy, and steps longer than a twentieth of the first
     period."""
     soft = described(written(tmp_path, BLOCKS.replace("E = 1.8e9", "E = 1.8e4")))
+    assert "the first natural period is 30.42 s" in soft["warnings"].pop(0)
     assert [one.split()[0] for one in soft["warnings"]] == ["'lower'", "'upper'"]
     assert (
         np.sqrt(0.5 * 1.8e4 / RHO) / 2.0 == pytest.approx(1.06, rel=1e-2)
@@ -394,7 +399,7 @@ def test_contact_nodes_are_counted_and_placed(shared_tmp: Path) -> None:
         "(3.07692, 6) and 4 more places; 1 node partly covered (carried by their neighbours), at "
         "(15.3846, 6)"
     )
-    assert f"  base: {contact['nodes']}" in put_in_words(model)
+    assert f"  {contact['nodes']}\n" in put_in_words(model)
     assert {kind: len(places) for kind, places in contact["others"].items()} == {
         "in front of nothing": 7,
         "partly covered": 1,
@@ -451,7 +456,7 @@ def test_steps_are_compared_with_periods_of_open_contact(shared_tmp: Path) -> No
         model["run"]["dt"] = dt * model["periods_open"][0] / 20.0
         said = [
             one
-            for one in _find_warnings(model)
+            for one in find_warnings(model)
             if "first natural period with the contact open" in one
         ]
         assert len(said) == count

@@ -59,20 +59,6 @@ RESULTS = {
     "pressure at the end of a part where x, or y, is least": ("pressure_low_",),
     "pressure at the end of a part where x, or y, is largest": ("pressure_high_",),
 }
-# Tables of model.json: title -> key.
-MODEL_TABLES = {
-    "bodies (SI units)": "bodies",
-    "supports": "supports",
-    "contact (size in m²)": "contact",
-    "waves against the mesh (SI units)": "waves",
-}
-# Sentences of model.json: sentence -> key.
-MODEL_FACTS = {
-    "The mass is {} kg.": "mass",
-    "There are {} unknowns.": "unknowns",
-    "First natural periods with the contact closed where it touches at the start: {} s.": "periods",
-    "The damping: {}.": "damping",
-}
 # Heads of tables.
 HEADERS = {
     "method": ("method and outcome", ""),

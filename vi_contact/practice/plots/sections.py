@@ -26,14 +26,11 @@ from .report_numbers import ReportNumbers, read_slice
 from .report_words import (
     CHARTS,
     HEADERS,
-    MODEL_FACTS,
-    MODEL_TABLES,
     RESULTS,
     SAY,
     SUMMARY,
 )
 
-NOT_SHOWN = ("places", "others", "sides")  # of what model.json tells of a contact
 # What of a part that stands upright says nothing: its thrust has a height in place of e.
 FOR_LEVEL_PARTS = ("e", "theta", "settlement")
 NOISE = 1e-6  # of the largest number in the same unit: what is smaller is rounding
@@ -93,6 +90,7 @@ def sections_of(
     model: Mapping[str, Any],
     columns: Sequence[Sequence[str]] | None = None,
     *,
+    inputs: Sequence[Table] = (),
     units: ReportUnits | None = None,
 ) -> list[Section]:
     """Return the sections that a run has data for.
@@ -102,6 +100,7 @@ def sections_of(
         model: model.json of its folder, empty where there is none.
         columns: groups of columns of one unit, a chart each for the histories; None: those that
             move.
+        inputs: tables of what was put in, for the first section.
         units: of the tables; None: the usual ones.
 
     Raises:
@@ -117,8 +116,8 @@ def sections_of(
         histories = charts.chart_groups(run, columns)
     numbers = ReportNumbers(units or ReportUnits(), read_slice(model))
     sections = [
-        _describe_model(model),
-        _describe_motion(run, model),
+        _describe_model(model, inputs),
+        _describe_motion(run),
         _tabulate_results(run, numbers),
         _compare_accelerations(run),
         Section("Histories", charts=histories, drawings=list_maps(run, model)),
@@ -142,40 +141,17 @@ def format_value(value: Any, depth: int = 9) -> str:
     return "-" if value is None else shorten(str(value), 200, placeholder=" …")
 
 
-def tabulate(title: str, rows: Any) -> list[Table]:
-    """Return the table of objects that a file lists.
-
-    It has a column for each of their keys; there is none for anything else.
-    """
-    listed = rows if isinstance(rows, list | tuple) else ()
-    objects = [row for row in listed if isinstance(row, Mapping)]
-    if not objects:
-        return []
-    keys = (key for row in objects for key in row if key not in NOT_SHOWN)
-    header = list(dict.fromkeys(keys))
-    cells = []
-    for row in objects:
-        cells.append([format_value(row.get(key)) for key in header])
-    return [Table(header, cells, title)]
-
-
-def _describe_model(model: Mapping[str, Any]) -> Section:
-    """Say what model.json tells: facts, warnings and tables of what it lists."""
-    tables = []
-    for title, key in MODEL_TABLES.items():
-        tables += tabulate(title, model.get(key))
-    sentences = [
-        text.format(format_value(model[key])) for text, key in MODEL_FACTS.items() if model.get(key)
-    ]
+def _describe_model(model: Mapping[str, Any], inputs: Sequence[Table]) -> Section:
+    """Set what was put in before all results, with what is doubted of it."""
     warnings = model.get("warnings")
+    sentences = []
     if isinstance(warnings, list):
-        sentences += [f"Warning: {format_value(warning)}." for warning in warnings]
-    return Section("Model and contact", sentences, tables)
+        sentences = [f"Warning: {format_value(warning)}." for warning in warnings]
+    return Section("Model and contact", sentences, inputs)
 
 
-def _describe_motion(run: RunFolder, model: Mapping[str, Any]) -> Section:
-    """Say how strongly the ground moved, with the records that model.json names."""
-    records = tabulate("records (SI units)", model.get("records"))
+def _describe_motion(run: RunFolder) -> Section:
+    """Say how strongly the ground moved."""
     motion = charts.chart_motion(run)
     sentences = []
     if motion:
@@ -184,7 +160,7 @@ def _describe_motion(run: RunFolder, model: Mapping[str, Any]) -> Section:
             peak = np.max(np.abs(run.history[line.name])) / STANDARD_GRAVITY
             texts.append(f"{peak:.3g} g along {line.name[-1]}")
         sentences = [SAY["shaken"].format(peaks=" and ".join(texts)), SAY["spectrum"]]
-    return Section("Ground motion", sentences, records, charts=motion)
+    return Section("Ground motion", sentences, charts=motion)
 
 
 def _tabulate_results(run: RunFolder, numbers: ReportNumbers) -> Section:

@@ -27,7 +27,8 @@ from ..plots.sketch import sketch
 from ..plots.web_page import MISSING, can_write, write_web_page
 from ..sheet.choices import Sheet, refuse_unknown_numbers
 from ..sheet.first_page import describe_first_page, list_title_block
-from ..units.report_units import write_number
+from ..units.report_units import ReportUnits, write_number
+from .cases.description.tables import input_tables
 from .cases.library import COPY, compute_checksum, read_copy, read_settings
 from .cases.parsing import Words, read, read_arguments
 from .cases.table_calls import Spot, build, make_callee
@@ -101,7 +102,8 @@ def write_report(
     pages = _choose_pages(folder, out)
 
     # Page 1 and its sketch, and the sections of what the run has told.
-    model, sketches = _draw_model(folder, pages[0].with_name("model.png"))
+    picture = pages[0].with_name("model.png")
+    model, inputs, sketches = _read_model(folder, picture, sheet.units)
     numbers = ReportNumbers(sheet.units, read_slice(model))
     first = describe_first_page(
         run,
@@ -112,7 +114,7 @@ def write_report(
         cost=_estimate_cost(run),
         sketches=sketches,
     )
-    told = sections_of(run, model, columns, units=sheet.units)
+    told = sections_of(run, model, columns, inputs=inputs, units=sheet.units)
     told[0] = replace(told[0], begins_page=True)
 
     # Before the last two of them, the solver's and the peaks, what is known beside the run.
@@ -178,12 +180,15 @@ def _choose_pages(folder: Path, out: str | Path | None) -> list[Path]:
     return [page]
 
 
-def _draw_model(folder: Path, picture: Path) -> tuple[dict[str, Any], list[Path]]:
-    """Return what model.json says, and its sketch; nothing where there is none."""
+def _read_model(
+    folder: Path, picture: Path, units: ReportUnits
+) -> tuple[dict[str, Any], list[Table], list[Path]]:
+    """Return what model.json says, in tables too, and its sketch; nothing where there is none."""
     if not is_own(folder / MODEL):
-        return {}, []
+        return {}, [], []
     try:
         model = read_object(folder / MODEL)
+        inputs = input_tables(model, units)
         image = render_image(sketch(model), bbox_inches="tight")
     except InputError:
         raise
@@ -196,7 +201,7 @@ def _draw_model(folder: Path, picture: Path) -> tuple[dict[str, Any], list[Path]
             f"'{folder / MODEL}' is damaged ({reason}): restore it, or delete it"
         ) from error
     write_output(picture, image)
-    return model, [picture]
+    return model, inputs, [picture]
 
 
 @check_arguments

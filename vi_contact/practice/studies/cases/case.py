@@ -47,8 +47,9 @@ from ....run.files.writer import FieldWriter
 from ....run.method import with_defaults
 from ....run.recorders import Contact, Energy
 from ....run.recorders.steps import Steps
-from ....run.simulate import Solution, simulate
+from ....run.simulate import Solution, rehearse, simulate
 from ....run.time_steps import StepPlan, plan_steps
+from ....solvers.automatic import Automatic
 from ...engineering.checks.comparison import Check
 from ...sheet.choices import Sheet, refuse_unknown_numbers
 from .bodies import (
@@ -255,7 +256,7 @@ class Case:
         folder = self.out if out is None else Path(out)
         # before any work; ``simulate`` looks once more, with the folder's lock
         if folder is not None:
-            on_root(MpiComm(comm), partial(self._refuse_files_of_others, folder))
+            on_root(MpiComm(comm), partial(self.refuse_files_of_others, folder))
         parts = None
         if self.sheet.numbers is not None:  # a number that the run does not have is told before it
             parts = self.parts(comm)
@@ -282,7 +283,7 @@ class Case:
                 **call, restart=restart, progress=progress, changed=changed, wall_time=wall_time
             )
 
-    def _refuse_files_of_others(self, folder: Path) -> None:
+    def refuse_files_of_others(self, folder: Path) -> None:
         """Raise InputError for files that the run would replace and that no run has made."""
         refuse_files_of_others(folder)
         refuse_case_of_others(self.path, folder)
@@ -296,7 +297,7 @@ class Case:
             folder: of the run; None: without.
         """
         if folder is not None:
-            from .description import FEW, describe, write_model  # late: it reads cases
+            from .description.model import FEW, describe, write_model  # late: it reads cases
 
             write_model(parts.system.algebra.comm, describe(self, comm, parts, most=FEW), folder)
 
@@ -324,6 +325,21 @@ class Case:
                 f"{self.path}: [strain_compatible] is for single runs: leave it out of stages and "
                 "studies"
             )
+        arguments = self._build_call(parts, folder, state)
+        ranks = parts.system.algebra.comm
+        with lock_folder(ranks, None if folder is None else run_folder(ranks, folder)):
+            if folder is not None:
+                keep_copy(self.path, self.settings, folder, ranks)
+            yield arguments
+
+    def _build_call(self, parts: Parts, folder: Path | None, state: State | None) -> dict[str, Any]:
+        """Return the call of ``simulate``; its weight is brought to rest. Collective.
+
+        Args:
+            parts: as of ``call``.
+            folder: of the run; None: without.
+            state: the first one, when it is known.
+        """
         problem = self._build_problem(parts)
         arguments = self._build_run(parts)
         arguments.pop("out", None)
@@ -333,21 +349,47 @@ class Case:
 
             static_solver = solver.primary if isinstance(solver, CrossChecked) else solver
             state = static_equilibrium(problem, solver=static_solver)
-        ranks = problem.system.algebra.comm
-        with lock_folder(ranks, None if folder is None else run_folder(ranks, folder)):
-            if folder is not None:
-                keep_copy(self.path, self.settings, folder, ranks)
-            yield arguments | {
-                "problem": problem,
-                "scheme": self._build_scheme(),
-                "solver": solver,
-                "state": state,
-                "out": folder,
-                "record": self._build_recorders(parts),
-                "escalation": self._build_tables("escalation"),
-                "fields": self._build_table("fields"),
-                "cross_check": solver if isinstance(solver, CrossChecked) else None,
-            }
+        return arguments | {
+            "problem": problem,
+            "scheme": self._build_scheme(),
+            "solver": solver,
+            "state": state,
+            "out": folder,
+            "record": self._build_recorders(parts),
+            "escalation": self._build_tables("escalation"),
+            "fields": self._build_table("fields"),
+            "cross_check": solver if isinstance(solver, CrossChecked) else None,
+        }
+
+    def rehearse(
+        self, parts: Parts, folder: Path, *, state: State | None = None, at_rest: bool = True
+    ) -> None:
+        """Do what a run does before its first step, and write nothing of it. Collective.
+
+        Args:
+            parts: as of ``call``.
+            folder: which the run would have.
+            state: the first one, when it is known.
+            at_rest: whether a problem with weight is brought to its equilibrium, as a run does;
+                False begins in the displacements at the start, which costs no factor.
+
+        Raises:
+            InputError: whatever the run refuses before its first step.
+        """
+        if not at_rest:
+            parts = replace(parts, weighted=False)
+        rehearse(**self._build_call(parts, folder, state))
+
+    def describe_method(self, problem: ContactProblem) -> dict[str, str]:
+        """Return scheme, mass and solver with which a problem of the case is marched, in words."""
+        problem, scheme = with_defaults(problem, self._build_scheme())
+        solver = self._build_table("solver") or Automatic()
+        solvers = (solver, *self._build_tables("escalation"))
+        return {
+            "scheme": repr(scheme),
+            "mass": repr(problem.mass),
+            "solver": ", then ".join(map(repr, solvers)),
+        }
 
     def _build_table(self, table: str, **context: Any) -> Any:
         """Return what a table makes; None where there is none."""

@@ -32,7 +32,7 @@ from ....run.files.reading import read_run
 from ....run.wall_time import WallTime
 from ...plots.studies import DemandPanel, plot_fragility, plot_ida
 from ..cases.case import Case, read_case
-from ..cases.description import describe
+from ..cases.description.model import describe
 from ..cases.parsing import suggest_nearest
 from .fragility import bracket_capacities, fragility_curve, read_limit
 from .measures import Demand, Intensity, compute_fractiles, read_demand, read_intensity
