@@ -261,6 +261,7 @@ def _check_model(case: "Case", comm: Any, folder: Path) -> str:
     model = describe(case, comm, parts)
     ranks = parts.system.algebra.comm
     case.columns(comm, parts)  # points and groups of the recorders
+    case.check_sheet(comm, parts)
     if is_marked(folder):  # of a run, of which model.json there tells
         folder = inner_folder(folder, "check")
     write_model(ranks, model, run_folder(ranks, folder))
