@@ -181,7 +181,7 @@ def _choose_pages(folder: Path, out: str | Path | None) -> list[Path]:
 
 
 def _read_model(
-    folder: Path, picture: Path, units: ReportUnits
+    folder: Path, picture: Path, units: ReportUnits = ReportUnits()
 ) -> tuple[dict[str, Any], list[Table], list[Path]]:
     """Return what model.json says, in tables too, and its sketch; nothing where there is none."""
     if not is_own(folder / MODEL):

@@ -193,9 +193,6 @@ class Case:
         """Return the columns that a run writes into history.csv; computes no step.
 
         ``parts`` as above. Collective.
-
-        Raises:
-            InputError: for numbers of [sheet] that are none of them.
         """
         parts = parts or self.parts(comm)
         problem = self._build_problem(parts)
@@ -204,17 +201,21 @@ class Case:
             recorders = (Energy(), Contact())
         problem, _ = with_defaults(problem, self._build_scheme())
         state = initial_state(problem)
-        columns = frozenset(
+        return frozenset(
             name
             for recorder in (Steps(), *recorders)
             for name, value in recorder.start(problem, state).items()
             if np.ndim(value) == 0
         )
+
+    def check_sheet(self, comm: Any, parts: Parts) -> None:
+        """Raise InputError for numbers of [sheet] that a run does not have. Collective."""
+        if self.sheet.numbers is None:
+            return
         try:
-            refuse_unknown_numbers(self.sheet, columns)
+            refuse_unknown_numbers(self.sheet, self.columns(comm, parts))
         except InputError as error:
             raise self.nodes["sheet"].spot.make_table_error(f"{error}") from error
-        return columns
 
     def _build_recorders(self, parts: Parts) -> tuple[Recorder, ...] | None:
         """Return the recorders of [[record]]; None for those of ``simulate``."""
@@ -258,9 +259,9 @@ class Case:
         if folder is not None:
             on_root(MpiComm(comm), partial(self.refuse_files_of_others, folder))
         parts = None
-        if self.sheet.numbers is not None:  # a number that the run does not have is told before it
+        if self.sheet.numbers is not None:
             parts = self.parts(comm)
-            self.columns(comm, parts)
+            self.check_sheet(comm, parts)
         if "strain_compatible" in self.nodes:
             return iterate(
                 self, comm, folder, restart=restart, progress=progress, wall_time=wall_time

@@ -48,6 +48,7 @@ def _rehearse(case: Case, comm: Any, parts: Parts, folder: Path) -> None:
         parts: of its last stage.
         folder: which the run would have.
     """
+    case.check_sheet(comm, parts)
     few = parts.system.space.unknowns <= MOST  # type: ignore[attr-defined]
     if "strain_compatible" in case.nodes:
         refuse_unfit(case)
