@@ -22,7 +22,7 @@ from vi_contact.core.surfaces import empty_surface
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.practice.cli.entry import main
 from vi_contact.practice.studies import read_case
-from vi_contact.practice.studies.cases.description import describe
+from vi_contact.practice.studies.cases.description.model import describe
 from vi_contact.practice.studies.cases.toml_file import format_value
 
 COMM = MPI.COMM_WORLD

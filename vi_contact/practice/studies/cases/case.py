@@ -9,6 +9,7 @@ interface.
 [[contact]]       fem.contact_surface, .contact_pair   [gravity]  with_weight, static_equilibrium
 [friction] [impact] [mass] [[excitation]]              [[check]]  to compare with engineering.checks
 [[stage]]  what replaces these tables in stages that follow one another
+[sheet]            whose the report is, which numbers decide in it, and its units
 [beam] [particle]  bodies and their contact, in place of [mesh] and the tables that belong to it
 [layer]            layer.contact_layer, in place of [friction], [impact] and [scheme]
 """
@@ -46,9 +47,11 @@ from ....run.files.writer import FieldWriter
 from ....run.method import with_defaults
 from ....run.recorders import Contact, Energy
 from ....run.recorders.steps import Steps
-from ....run.simulate import Solution, simulate
+from ....run.simulate import Solution, rehearse, simulate
 from ....run.time_steps import StepPlan, plan_steps
+from ....solvers.automatic import Automatic
 from ...engineering.checks.comparison import Check
+from ...sheet.choices import Sheet, refuse_unknown_numbers
 from .bodies import (
     BeamBody,
     Body,
@@ -102,6 +105,7 @@ TABLES: dict[str, Any] = {
     "record": Recorder | Sequence[Recorder],
     "fields": FieldWriter,
     "check": Check | Sequence[Check],
+    "sheet": make_callee(Sheet),
 }
 
 
@@ -206,6 +210,15 @@ class Case:
             if np.ndim(value) == 0
         )
 
+    def check_sheet(self, comm: Any, parts: Parts) -> None:
+        """Raise InputError for numbers of [sheet] that a run does not have. Collective."""
+        if self.sheet.numbers is None:
+            return
+        try:
+            refuse_unknown_numbers(self.sheet, self.columns(comm, parts))
+        except InputError as error:
+            raise self.nodes["sheet"].spot.make_table_error(f"{error}") from error
+
     def _build_recorders(self, parts: Parts) -> tuple[Recorder, ...] | None:
         """Return the recorders of [[record]]; None for those of ``simulate``."""
         return self._build_tables("record", tags=parts.tags) if "record" in self.nodes else None
@@ -246,7 +259,11 @@ class Case:
         folder = self.out if out is None else Path(out)
         # before any work; ``simulate`` looks once more, with the folder's lock
         if folder is not None:
-            on_root(MpiComm(comm), partial(self._refuse_files_of_others, folder))
+            on_root(MpiComm(comm), partial(self.refuse_files_of_others, folder))
+        parts = None
+        if self.sheet.numbers is not None:
+            parts = self.parts(comm)
+            self.check_sheet(comm, parts)
         if "strain_compatible" in self.nodes:
             return iterate(
                 self, comm, folder, restart=restart, progress=progress, wall_time=wall_time
@@ -262,14 +279,14 @@ class Case:
                 changed=changed,
                 wall_time=wall_time,
             )
-        parts = self.parts(comm)
+        parts = parts or self.parts(comm)
         with self.call(parts, folder) as call:
             self.keep_model(comm, parts, folder)
             return simulate(
                 **call, restart=restart, progress=progress, changed=changed, wall_time=wall_time
             )
 
-    def _refuse_files_of_others(self, folder: Path) -> None:
+    def refuse_files_of_others(self, folder: Path) -> None:
         """Raise InputError for files that the run would replace and that no run has made."""
         refuse_files_of_others(folder)
         refuse_case_of_others(self.path, folder)
@@ -283,7 +300,7 @@ class Case:
             folder: of the run; None: without.
         """
         if folder is not None:
-            from .description import FEW, describe, write_model  # late: it reads cases
+            from .description.model import FEW, describe, write_model  # late: it reads cases
 
             write_model(parts.system.algebra.comm, describe(self, comm, parts, most=FEW), folder)
 
@@ -311,6 +328,21 @@ class Case:
                 f"{self.path}: [strain_compatible] is for single runs: leave it out of stages and "
                 "studies"
             )
+        arguments = self._build_call(parts, folder, state)
+        ranks = parts.system.algebra.comm
+        with lock_folder(ranks, None if folder is None else run_folder(ranks, folder)):
+            if folder is not None:
+                keep_copy(self.path, self.settings, folder, ranks)
+            yield arguments
+
+    def _build_call(self, parts: Parts, folder: Path | None, state: State | None) -> dict[str, Any]:
+        """Return the call of ``simulate``; its weight is brought to rest. Collective.
+
+        Args:
+            parts: as of ``call``.
+            folder: of the run; None: without.
+            state: the first one, when it is known.
+        """
         problem = self._build_problem(parts)
         arguments = self._build_run(parts)
         arguments.pop("out", None)
@@ -320,21 +352,47 @@ class Case:
 
             static_solver = solver.primary if isinstance(solver, CrossChecked) else solver
             state = static_equilibrium(problem, solver=static_solver)
-        ranks = problem.system.algebra.comm
-        with lock_folder(ranks, None if folder is None else run_folder(ranks, folder)):
-            if folder is not None:
-                keep_copy(self.path, self.settings, folder, ranks)
-            yield arguments | {
-                "problem": problem,
-                "scheme": self._build_scheme(),
-                "solver": solver,
-                "state": state,
-                "out": folder,
-                "record": self._build_recorders(parts),
-                "escalation": self._build_tables("escalation"),
-                "fields": self._build_table("fields"),
-                "cross_check": solver if isinstance(solver, CrossChecked) else None,
-            }
+        return arguments | {
+            "problem": problem,
+            "scheme": self._build_scheme(),
+            "solver": solver,
+            "state": state,
+            "out": folder,
+            "record": self._build_recorders(parts),
+            "escalation": self._build_tables("escalation"),
+            "fields": self._build_table("fields"),
+            "cross_check": solver if isinstance(solver, CrossChecked) else None,
+        }
+
+    def rehearse(
+        self, parts: Parts, folder: Path, *, state: State | None = None, at_rest: bool = True
+    ) -> None:
+        """Do what a run does before its first step, and write nothing of it. Collective.
+
+        Args:
+            parts: as of ``call``.
+            folder: which the run would have.
+            state: the first one, when it is known.
+            at_rest: whether a problem with weight is brought to its equilibrium, as a run does;
+                False begins in the displacements at the start, which costs no factor.
+
+        Raises:
+            InputError: whatever the run refuses before its first step.
+        """
+        if not at_rest:
+            parts = replace(parts, weighted=False)
+        rehearse(**self._build_call(parts, folder, state))
+
+    def describe_method(self, problem: ContactProblem) -> dict[str, str]:
+        """Return scheme, mass and solver with which a problem of the case is marched, in words."""
+        problem, scheme = with_defaults(problem, self._build_scheme())
+        solver = self._build_table("solver") or Automatic()
+        solvers = (solver, *self._build_tables("escalation"))
+        return {
+            "scheme": repr(scheme),
+            "mass": repr(problem.mass),
+            "solver": ", then ".join(map(repr, solvers)),
+        }
 
     def _build_table(self, table: str, **context: Any) -> Any:
         """Return what a table makes; None where there is none."""
@@ -353,6 +411,11 @@ class Case:
         table = find_body_table(self.nodes)
         body: Body | None = self._build_table(table) if table else None
         return body
+
+    @cached_property
+    def sheet(self) -> Sheet:
+        """Return what [sheet] says of the report."""
+        return self._build_table("sheet") or Sheet()
 
     @cached_property
     def layer(self) -> "ContactLayer | None":

@@ -107,7 +107,7 @@ def find_left_over(path: Path, tables: Mapping[str, Any]) -> Iterator[str]:
     """
     stages = tables.get("stage", ())
     if stages and all(stage.get("type") == "static" for stage in stages):
-        for key in OF_MOTION:
+        for key in (*OF_MOTION, "sheet"):
             if key in tables:
                 yield (
                     f"[{key}] of {path} is for motions and is not read, as every [[stage]] is "

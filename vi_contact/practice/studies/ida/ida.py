@@ -32,7 +32,7 @@ from ....run.files.reading import read_run
 from ....run.wall_time import WallTime
 from ...plots.studies import DemandPanel, plot_fragility, plot_ida
 from ..cases.case import Case, read_case
-from ..cases.description import describe
+from ..cases.description.model import describe
 from ..cases.parsing import suggest_nearest
 from .fragility import bracket_capacities, fragility_curve, read_limit
 from .measures import Demand, Intensity, compute_fractiles, read_demand, read_intensity
@@ -297,7 +297,9 @@ def _claim_folder(study: IDA, out: Path) -> None:
     Raises:
         InputError: for the folder of another study, and for files that no study has made.
     """
-    case = _digest(to_json(study.case.tables).encode())
+    # What a report says beside the mechanics makes no other study.
+    tables = {name: table for name, table in study.case.tables.items() if name != "sheet"}
+    case = _digest(to_json(tables).encode())
     records = {shaking.name: _digest_files(shaking) for shaking in study.shakings}
     old = read_json(out / STUDY)
     if old is None:
