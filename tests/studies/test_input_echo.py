@@ -190,20 +190,22 @@ def test_any_number_of_ranks_tells_the_same(shared_tmp: Path) -> None:
     assert many == alone
 
 
+IN_SPACE = {
+    "[20.0, 6.0], divisions = [20, 3]": "[20.0, 6.0, 6.0], divisions = [10, 3, 2]",
+    "[4.0, 10.0], divisions = [4, 10]": "[4.0, 10.0, 2.0], divisions = [2, 10, 1]",
+    "offset = [8.0]": "offset = [8.0, 3.0]",
+    'cells = "upper"': 'cells = "upper"\ndirection = [0.0, -1.0, 0.0]',
+    "\ndirection = [1.0, 0.0]\n": "\ndirection = [1.0, 0.0, 0.0]\n",
+    'facets2 = "lower_top"': 'facets2 = "lower_top"\nmatching = {type = "DualMortar"}',
+}
+
+
 def test_loads_and_sides_in_space(shared_tmp: Path) -> None:
     """The dam 2 m long, with gravity along -y: the loads are twice those of a metre."""
-    text = DAM.replace(
-        "[20.0, 6.0], divisions = [20, 3]", "[20.0, 6.0, 6.0], divisions = [10, 3, 2]"
-    )
-    text = text.replace(
-        "[4.0, 10.0], divisions = [4, 10]", "[4.0, 10.0, 2.0], divisions = [2, 10, 1]"
-    )
-    text = text.replace("offset = [8.0]", "offset = [8.0, 3.0]")
-    text = text.replace('cells = "upper"', 'cells = "upper"\ndirection = [0.0, -1.0, 0.0]')
-    text = text.replace("direction = [1.0, 0.0]", "direction = [1.0, 0.0, 0.0]")
-    text = text.replace(
-        'facets2 = "lower_top"', 'facets2 = "lower_top"\nmatching = {type = "DualMortar"}'
-    )
+    text = DAM
+    for old, new in IN_SPACE.items():
+        assert text.count(old) == 1
+        text = text.replace(old, new)
     model = described(shared_tmp, text=text)
     weight, thrust, uplift = model["loads"]
     assert weight["point"] == pytest.approx([10.0, 11.0, 4.0], rel=1e-9)
