@@ -190,6 +190,37 @@ def test_any_number_of_ranks_tells_the_same(shared_tmp: Path) -> None:
     assert many == alone
 
 
+IN_SPACE = {
+    "[20.0, 6.0], divisions = [20, 3]": "[20.0, 6.0, 6.0], divisions = [10, 3, 2]",
+    "[4.0, 10.0], divisions = [4, 10]": "[4.0, 10.0, 2.0], divisions = [2, 10, 1]",
+    "offset = [8.0]": "offset = [8.0, 3.0]",
+    'cells = "upper"': 'cells = "upper"\ndirection = [0.0, -1.0, 0.0]',
+    "\ndirection = [1.0, 0.0]\n": "\ndirection = [1.0, 0.0, 0.0]\n",
+    'facets2 = "lower_top"': 'facets2 = "lower_top"\nmatching = {type = "DualMortar"}',
+}
+
+
+def test_loads_and_sides_in_space(shared_tmp: Path) -> None:
+    """The dam 2 m long, with gravity along -y: the loads are twice those of a metre."""
+    text = DAM
+    for old, new in IN_SPACE.items():
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    model = described(shared_tmp, text=text)
+    weight, thrust, uplift = model["loads"]
+    assert weight["point"] == pytest.approx([10.0, 11.0, 4.0], rel=1e-9)
+    assert thrust["force"] == pytest.approx([2.0 * THRUST, 0.0, 0.0], rel=1e-9)
+    assert thrust["point"] == pytest.approx([8.0, 6.0 + 8.0 / 3.0, 4.0], rel=1e-9)
+    assert uplift["point"] == pytest.approx([8.0 + 4.0 / 3.0, 6.0, 4.0], rel=1e-9)
+    assert model["constant_loads"]["level"] == pytest.approx(6.0)
+    assert model["constant_loads"]["point"][2] == pytest.approx(4.0)
+    distances = {place["side"]: place["distance"] for place in model["sides"]["distances"]}
+    assert distances == pytest.approx(
+        {"x min": 8.0, "x max": 8.0, "y min": 6.0, "z min": 3.0, "z max": 1.0}
+    )
+    assert rows_of(model)["Pressure on 'upper_left': resultant"][1] == "kN"
+
+
 @pytest.mark.serial
 def test_points_of_attack_in_space() -> None:
     """A force of 2 N along -z through (1, 2), in the plane z = 3; a moment along it stays."""

@@ -15,6 +15,7 @@ from ..bodies import find_body_table
 from ..expressions import Expression, Places
 from ..table_calls import Call, Group, build, walk_nodes
 from .bodies import name_body
+from .surroundings import find_bottom
 
 FORCES = ("N", "N/m")  # units of what acts on a body without a mesh
 PLACES = 11  # of a part of a resultant, relative to the whole
@@ -79,7 +80,7 @@ def _round(load: dict[str, Any], size: float) -> dict[str, Any]:
     rounded = dict(load)
     for key, whole in sizes.items():
         if load.get(key) and whole:
-            rounded[key] = (np.round(np.array(load[key]) / whole, PLACES) * whole).tolist()
+            rounded[key] = (np.round(np.array(load[key]) / whole, PLACES) * whole + 0.0).tolist()
     return rounded
 
 
@@ -221,7 +222,7 @@ def sum_up(model: Mapping[str, Any]) -> dict[str, Any]:
     where nothing stands in a ground: its distance from the middle of a base is the eccentricity.
 
     Args:
-        model: with the keys dimension, box, loads and sides of model.json.
+        model: with the keys dimension, box, gravity, loads and sides of model.json.
 
     Returns:
         force [N], moment about the origin [N m], point [m] and level [m]; the last two are None for
@@ -241,7 +242,9 @@ def sum_up(model: Mapping[str, Any]) -> dict[str, Any]:
 
     # The point of this level below the middle of the model is one of the plane.
     box = model["box"]
+    axis, end = find_bottom(model)
+    level = model["sides"].get("foot", box[end][axis])
     near = 0.5 * (np.array(box["min"]) + np.array(box["max"]))
-    near[-1] = model["sides"].get("foot", box["min"][-1])
-    found = find_point(force, moment, near=near, normal=np.eye(d)[-1])
-    return told | {"point": None if found is None else found.tolist(), "level": float(near[-1])}
+    near[axis] = level
+    found = find_point(force, moment, near=near, normal=np.eye(d)[axis])
+    return told | {"point": None if found is None else found.tolist(), "level": float(level)}
