@@ -77,9 +77,9 @@ def chain_border(lines: Array) -> Border:
     points = ends[first]
     nodes = place.reshape(-1, 2)
     lines_of = defaultdict(list)
-    for number, (one, other) in enumerate(nodes.tolist()):
-        lines_of[one].append(number)
-        lines_of[other].append(number)
+    for number, (start, end) in enumerate(nodes.tolist()):
+        lines_of[start].append(number)
+        lines_of[end].append(number)
 
     # Open chains first, from an end that belongs to one line; what is left is closed.
     ends_alone = [int(one) for one in nodes.ravel() if len(lines_of[int(one)]) == 1]
@@ -92,16 +92,16 @@ def chain_border(lines: Array) -> Border:
     return Border(tuple(chains))
 
 
-def _follow(start: int, nodes: Array, lines_of: dict[int, list[int]], left: set[int]) -> list[int]:
-    """Return the points of a chain from ``start``; its lines are taken from those left."""
-    chain = [start]
+def _follow(first: int, nodes: Array, lines_of: dict[int, list[int]], left: set[int]) -> list[int]:
+    """Return the points of a chain from ``first``; its lines are taken from those left."""
+    chain = [first]
     while True:
         free = [number for number in lines_of[chain[-1]] if number in left]
         if not free:
             return chain
         left.discard(free[0])
-        one, other = nodes[free[0]].tolist()
-        chain.append(other if one == chain[-1] else one)
+        start, end = nodes[free[0]].tolist()
+        chain.append(end if start == chain[-1] else start)
 
 
 def _find_area(chain: Array) -> float:

@@ -219,14 +219,15 @@ def _draw_loads(labels: Labels, loads: Any, d: int, size: float) -> None:
     """
     if d != 2:
         return
-    found = list(_list_loads(loads))
-    most = max((float(np.linalg.norm(force)) for *_, force in found), default=0.0)
+    drawn = list(_list_loads(loads))
+    most = max((float(np.linalg.norm(force)) for *_, force in drawn), default=0.0)
     names = []
-    for name, weight, point, force in found:
+    for name, weight, point, force in drawn:
         length = float(np.linalg.norm(force))
         along = force / length
         arrow = ARROW * size * (LEAST_ARROW + (1.0 - LEAST_ARROW) * length / most) * along
-        tip, tail = (point + arrow, point) if weight else (point, point - arrow)
+        tail = point if weight else point - arrow
+        tip = tail + arrow
         look = {"arrowstyle": "-|>", "lw": 1.6, "color": "black", "shrinkA": 0, "shrinkB": 0}
         labels.axis.annotate("", tip, tail, arrowprops=look, zorder=6)
         labels.reserve(np.array([tip, tail]))
