@@ -62,6 +62,7 @@ from .expressions import check_axes
 from .library import check_format, find_base_folder, keep_copy, refuse_case_of_others
 from .own_classes import check_packages
 from .parsing import Words, read, read_arguments, suggest_nearest
+from .sentences import in_words_of_case_files
 from .stage_tables import Stage, split_stages
 from .stages import Reached, run_stages
 from .strain_compatible import CALL, iterate, with_known_damping
@@ -137,6 +138,7 @@ class Case:
         """Return what shakes the body; record files are read here."""
         return self._build_tables("excitation", **context)
 
+    @in_words_of_case_files()
     def check(self) -> None:
         """Make everything that needs no mesh.
 
@@ -163,6 +165,7 @@ class Case:
         except InputError as error:
             raise InputError(f"{self.path}: [run] {error}") from None
 
+    @in_words_of_case_files()
     def problem(self, comm: Any, parts: Parts | None = None) -> ContactProblem:
         """Return the contact problem; ``parts``: those of ``parts``, when they are known.
 
@@ -185,6 +188,7 @@ class Case:
             return arguments
         return arguments | {"t_end": self._find_duration(parts)}
 
+    @in_words_of_case_files()
     def columns(self, comm: Any, parts: Parts | None = None) -> frozenset[str]:
         """Return the columns that a run writes into history.csv; computes no step.
 
@@ -208,6 +212,7 @@ class Case:
         """Return the recorders of [[record]]; None for those of ``simulate``."""
         return self._build_tables("record", tags=parts.tags) if "record" in self.nodes else None
 
+    @in_words_of_case_files()
     def run(
         self,
         comm: Any,
@@ -382,6 +387,7 @@ class Case:
                 f"{error}"
             ) from error
 
+    @in_words_of_case_files()
     def parts(self, comm: Any) -> Parts:
         """Return what the problem is made of; collective."""
         if self.body is not None:

@@ -20,6 +20,7 @@ from typing import Any
 
 from ....core.errors import InputError
 from ....core.quantities import Quantity, read_quantities
+from .sentences import write_for_case_files
 
 Context = Mapping[str, Any]
 # What has been read: a Group or Call, a tuple or dict of nodes; all else stands for itself.
@@ -200,7 +201,7 @@ class Call:
         try:
             return self.callee.function(**supplied, **arguments)
         except InputError as error:
-            raise self.spot.make_table_error(f"{error}") from error
+            raise self.spot.make_table_error(write_for_case_files(str(error))) from error
 
 
 def needs_body(node: Node) -> bool:

@@ -414,6 +414,54 @@ _FUNCTIONS: Mapping[Any, Mapping[str, Callable[[], Any]]] = {
 }
 
 
+# kind -> where a case file makes such a thing: a table, or the key of one
+_PLACES: tuple[tuple[Any, str], ...] = (
+    (Scheme, "[scheme]"),
+    (Solver, "[solver]"),
+    (FrictionLaw, "[friction]"),
+    (ImpactLaw, "[impact]"),
+    (MassLaw, "[mass]"),
+    (Excitation, "[[excitation]]"),
+    (Recorder, "[[record]]"),
+    (FieldWriter, "[fields]"),
+    (MeshScript, "[mesh]"),
+    (LinearElastic, "[material.NAME]"),
+    (Orthotropic, "[material.NAME]"),
+    (Heterogeneous, "[material.NAME]"),
+    (Damping, "[system.damping]"),
+    (Section, "[system.section]"),
+    (Traction, "[[system.loads]]"),
+    (BodyForce, "[[system.loads]]"),
+    (Prescribed, "[[system.prescribed]]"),
+    (Dashpots, "[[system.dashpots]]"),
+    (Matching, "matching"),
+    (Obstacle, "obstacle"),
+    (SmallMethod, "method"),
+    (FrictionMethod, "method"),
+    (Method, "method"),
+    (Extrapolation, "extrapolation"),
+    (VelocityUpdate, "update"),
+)
+
+
+def find_word(name: str) -> tuple[str, tuple[str, ...]] | None:
+    """Return the table or key of a case file that makes an object of a class, and its keys.
+
+    Args:
+        name: of the class, or of a constructor, as "GeneralisedAlpha.spectral_radius".
+
+    Returns:
+        "[scheme]" or "matching", and the names of the parameters; None where no case file has it.
+    """
+    choices_of_kind = _gather_choices()
+    for kind, place in _PLACES:
+        try:
+            return place, tuple(choices_of_kind[kind][name].quantities)
+        except KeyError:
+            continue
+    return None
+
+
 def list_names(kind: Any) -> tuple[str, ...]:
     """Return the words for things of a kind: ``list_names(Scheme)`` are the schemes."""
     return tuple(_gather_choices()[kind])
