@@ -2,6 +2,7 @@
 
 import argparse
 import logging
+import signal
 import sys
 import traceback
 from collections.abc import Callable, Sequence
@@ -9,13 +10,23 @@ from collections.abc import Callable, Sequence
 from ...core.errors import Interrupted, OutOfTime, ViContactError
 from ...core.version import __version__
 from .case import add_case_commands
-from .errors import Parser, check_words, explain_errors, fail_together, keep_streams, say, world
+from .errors import (
+    Parser,
+    check_words,
+    explain_errors,
+    fail_together,
+    is_of_pipe,
+    keep_streams,
+    say,
+    world,
+)
 from .ida import add_ida_commands
 
 _DESCRIPTION = """vi-contact computes structures that may lift off, bounce and slide. It checks
 every time step. Start it with "mpirun -n N vi-contact" on N ranks. Options that begin with
 -vi_contact_volume_ go to PETSc, for example -vi_contact_volume_snes_monitor."""
 _PETSC = "-vi_contact_"
+PIPE_STATUS = 128 + signal.SIGPIPE  # as shells have it where nobody reads what is written
 
 
 def build_parser(command: str = "") -> argparse.ArgumentParser:
@@ -39,6 +50,15 @@ def build_parser(command: str = "") -> argparse.ArgumentParser:
         add_post_commands(commands)
         add_validate_command(commands)
     return top
+
+
+def parse_words(words: Sequence[str]) -> argparse.Namespace:
+    """Parse the words of a command; an unknown option is told under the usage of its command."""
+    parser = build_parser(words[0] if words else "")
+    options, unknown = parser.parse_known_args(words)
+    if unknown:
+        options.parser.error(f"unknown option: {' '.join(unknown)}")
+    return options
 
 
 def split_petsc(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
@@ -69,7 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     own, petsc = split_petsc(sys.argv[1:] if arguments is None else arguments)
 
     def command() -> None:
-        options = build_parser(own[0] if own else "").parse_args(own)
+        options = parse_words(own)
         if petsc:
             import petsc4py
 
@@ -91,7 +111,9 @@ def status_of(call: Callable[[], object]) -> int:
     keep_streams()
     try:
         explain_errors(call, {})
-    except ViContactError as error:
+    except (BrokenPipeError, ViContactError) as error:
+        if is_of_pipe(error):
+            return PIPE_STATUS
         fail_together(str(error))
         return _print_error(error, 1)
     except KeyboardInterrupt as error:

@@ -19,6 +19,7 @@ from ...core.files import describe_os_error
 
 PATIENCE = 30.0  # seconds between the first rank that has failed and the last
 LIBRARIES = ("dolfinx", "ufl", "basix", "petsc4py", "mpi4py", "h5py", "gmsh", "matplotlib", "tqdm")
+STREAMS = ("/dev/stdout", "/dev/fd/1", "/proc/self/fd/1")  # names of standard output
 OUTPUTS = ("--out", "--csv", "--png")
 CONTROLS = re.compile("[\\x00-\\x08\\x0b-\\x1f\\x7f-\\x9f]")  # characters that steer a terminal
 OUT_OF_MEMORY = (
@@ -71,10 +72,14 @@ def explain_errors(call: Callable[[], Any], spelling: Mapping[str, str]) -> Any:
     except ViContactError as error:
         if is_of_memory(error):
             raise ViContactError(OUT_OF_MEMORY) from error
+        if is_of_pipe(error):
+            raise
         if spelling and isinstance(error, InputError):
             raise InputError(_spell_options(str(error), spelling)) from error
         raise
     except Exception as error:
+        if is_of_pipe(error):
+            raise
         text = _explain(error)
         if text is None:
             raise
@@ -88,6 +93,18 @@ def _spell_options(text: str, spelling: Mapping[str, str]) -> str:
         text = text.replace(f" {argument}= ", f" {option} ")
         text = text.replace(f" {argument}=", f" {option} ")
     return text.rstrip()
+
+
+def is_of_pipe(error: BaseException | None) -> bool:
+    """Tell whether standard output was the file to write, and nobody reads it any more.
+
+    This is no fault: ``motion convert FILE /dev/stdout | head -1`` has what it wants.
+    """
+    while error is not None:
+        if isinstance(error, BrokenPipeError) and error.filename in STREAMS:
+            return True
+        error = error.__cause__
+    return False
 
 
 def escape_unprintable(text: str) -> str:
