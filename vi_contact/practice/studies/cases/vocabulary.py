@@ -294,6 +294,25 @@ def resultants(
     return run.Resultants(name, centre, normal=normal, part=part)
 
 
+def probe(
+    points: Annotated[Mapping[Any, tuple[float, ...]], Unit("m")],
+    velocity: bool = False,
+    acceleration: bool = False,
+    nearest: bool = False,
+    cells: Cells | None = None,
+) -> run.Probe:
+    """Record ``Probe``, at points of a cell group where ``cells`` names one.
+
+    Args:
+        points: label -> (d,) [m].
+        velocity: whether velocities are recorded too.
+        acceleration: whether absolute accelerations are recorded too.
+        nearest: whether every point takes its nearest node.
+        cells: the body that the points are of; None: the whole mesh.
+    """
+    return run.Probe(points, velocity, acceleration, nearest, cells)
+
+
 def upgoing(
     excitations: Any,
     motion: Record | Excitation | Sequence[Excitation] | None = None,
@@ -400,7 +419,7 @@ _FUNCTIONS: Mapping[Any, Mapping[str, Callable[[], Any]]] = {
     Schedule: {"FirstModePeriod": lambda: first_mode_period},
     Heterogeneous: {"Heterogeneous": lambda: heterogeneous},
     Obstacle: {"AnalyticGap": lambda: analytic_gap},
-    Recorder: {"Resultants": lambda: resultants},
+    Recorder: {"Resultants": lambda: resultants, "Probe": lambda: probe},
     BeamBody: {
         name: lambda name=name: getattr(bodies, name)  # type: ignore[misc]
         for name in ("rod_problem", "beam_problem", "rubbing_problem")
