@@ -55,6 +55,10 @@ SENTENCES = {
         "slide freely (surface.with_frictionless_corners())",
         "slide freely (frictionless_corners = true in every [[contact]])",
     ),
+    "a point of a probe": (
+        "Probe: points['10']: point (6, 7.5) is 1.5 m away",
+        "[record.points] 10: point (6, 7.5) is 1.5 m away",
+    ),
     "an argument that is an option": ("allow it (changed=True)", "allow it (--restart-changed)"),
 }
 # What has signs of equality or brackets and is no call.
@@ -118,6 +122,23 @@ def test_a_table_that_cannot_be_made_says_what_to_write(tmp_path: Path) -> None:
     case.write_text(CORNER + f"[system]\n{broken}\n")
     with pytest.raises(InputError, match=r"\[material"):
         read_case(case)
+
+
+@pytest.mark.parametrize(
+    ("settings", "place"),
+    [
+        (["mesh.divisions=[4, 6]"], "[contact] contact point (6, 2.25) is 0.75 m away"),
+        (["mesh.height=6", "contact.points="], "[record.points] 10: point (6, 7.5) is 1.5 m away"),
+    ],
+)
+def test_another_wall_names_the_points_of_the_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], settings: list[str], place: str
+) -> None:
+    """The built-in wall lists points, which the user has not written."""
+    words = [word for setting in settings for word in ("--set", setting)]
+    assert main(["run", "wall", *words, "--quiet", "--out", str(tmp_path / "out")]) == 1
+    said = capsys.readouterr().err
+    assert place in said and "leave" in said
 
 
 def test_an_unknown_option_is_told_under_the_usage_of_its_command(

@@ -522,7 +522,7 @@ def find_listed(
         if distance[row] > 0.05 * space.size:
             raise InputError(
                 f"contact point {describe_point(x)} is {distance[row]:.3g} m away from boundary "
-                f"group '{name}': give a point on it"
+                f"group '{name}': give a point on it, or leave points= out for the whole boundary"
             )
         if distance[row] > 1e-6 * space.size and space.comm.rank == 0:
             log.warning(
@@ -537,7 +537,8 @@ def find_listed(
         if row in rows:
             raise InputError(
                 f"contact point {describe_point(x)} is listed twice (nearest node "
-                f"{nodes.numbers[row]}): list each once"
+                f"{nodes.numbers[row]}): list each once, or leave points= out "
+                "for the whole boundary"
             )
         rows.append(row)
     if not rows:

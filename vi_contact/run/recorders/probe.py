@@ -162,18 +162,20 @@ class Probe:
             provides("Probe", "the system's space", space, ("find_nodes_of_cells",), remedy)
             chosen = self.cells.indices
             among = space.find_nodes_of_cells(chosen)
-        nodes, distances = space.find_nearest(points, anywhere=in_cells, among=among)
+        nodes, distances = space.find_nearest(points, anywhere=True, among=among)
         distances[distances <= SAME * space.size] = 0.0
         away = np.flatnonzero(distances)
-        if not in_cells or not len(away):
-            return Places.at_nodes(nodes, distances)
 
         # Points that are at no node are in a cell, or so near to the body that a node is meant:
-        # ``find_nodes`` refuses others.
-        cells = space.find_in_cells(points[away], chosen)
+        # others are refused.
+        cells: list[tuple[Indices, Array] | None] = [None] * len(away)
+        if in_cells and len(away):
+            cells = space.find_in_cells(points[away], chosen)
         for k, cell in zip(away, cells, strict=True):
             if cell is None:
-                space.find_nearest(points[k][None], among=among)
+                self._refuse_outside(space, k, points[k], among)
+        if not in_cells or not len(away):
+            return Places.at_nodes(nodes, distances)
 
         # Rows of equal length: those of points at a node are filled up with weights of zero.
         width = max((len(cell[0]) for cell in cells if cell is not None), default=1)
@@ -185,6 +187,21 @@ class Probe:
                 table[k], weights[k] = cell
                 distances[k] = 0.0
         return Places(table, weights, distances)
+
+    def _refuse_outside(self, space: Any, number: int, point: Array, among: Indices | None) -> None:
+        """Raise InputError for a point that is not of the body, with its label. Collective.
+
+        Args:
+            space: of the body.
+            number: of the point.
+            point: (d,) [m].
+            among: as of ``find_nearest``.
+        """
+        try:
+            space.find_nearest(point[None], among=among)
+        except InputError as error:
+            label = list(self.points)[number]
+            raise InputError(f"Probe: points['{label}']: {error}, or leave it out") from None
 
     def _tell_distances(self, problem: ContactProblem) -> None:
         """Say on rank 0 how far the nodes are that points take their values from."""

@@ -29,6 +29,7 @@ PHRASES = {
     "changed=True": "--restart-changed",
     "restart=True": "--restart",
 }
+_PROBE = re.compile(r"Probe: points\['(\w+)'\]:")  # a point of the recorder
 _PACKAGES = "(?:(?:vc|fem|laws|meshes|soil)\\.)?"
 _CALL = re.compile(rf"(?<![\w.'])(?:[a-z_]+=)?{_PACKAGES}([A-Z]\w*(?:\.\w+)?)\(")
 _KEYWORD = re.compile(r"(?<![\w./'\-])([a-z_]\w*)=(?![=\w])(…|\.\.\.)?")
@@ -39,6 +40,7 @@ def write_for_case_files(text: str) -> str:
     """Return a sentence with the words of case files in place of calls of Python."""
     for phrase, translation in PHRASES.items():
         text = text.replace(phrase, translation)
+    text = _PROBE.sub(r"[record.points] \1:", text)
     place = 0
     while (match := _CALL.search(text, place)) is not None:
         end = _find_bracket(text, match.end())
