@@ -27,6 +27,7 @@ from ...core.checks import describe_point, flag, optional, provides
 from ...core.collective import together
 from ...core.corners import FEATURE_ANGLE
 from ...core.errors import InputError
+from ...core.obstacles import PRESS_FIT
 from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem
 from ...core.timing import report_time
@@ -687,9 +688,7 @@ def _measure_gap(
             f"'{side2.name}' lies {-gap[worst]:.3g} m behind '{name}' at "
             f"{describe_point(nodes.points[worst])}"
             ": the bodies overlap there, or these are not the boundaries between them; choose the "
-            "sides that face, or draw the bodies in touch and make a press fit by "
-            "fem.InitialStrain, the strain of the body that is too large, or by quasi_static on "
-            "surface.moving(towards=…), its overlap"
+            f"sides that face, or {PRESS_FIT}"
         )
     if gap.min() < -1e-12 * space.size and space.comm.rank == 0:
         log.warning(
