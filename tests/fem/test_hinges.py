@@ -186,7 +186,7 @@ E = "150 MPa"
 nu = 0.3
 rho = 1900.0
 [system]
-clamped = "rock"
+fixed = "rock"
 [gravity]
 [[contact]]
 name = "base"

@@ -509,7 +509,7 @@ def test_wrong_options(wrong, sentence):
 def test_the_case_held_and_on_another_mesh():
     """Keys of the mesh and of its contact: the linear comparison is that of the model."""
     coarse = build(Channel(ChannelMesh(size=1.0)), COMM)
-    held = [f"contact.{k}.held=true" for k in (1, 2, 3)]
+    held = [f"contact.{k}.roller=true" for k in (1, 2, 3)]
     problem = built_in("mesh.size=1", *held).problem(COMM)
     assert (
         problem.system.space.unknowns

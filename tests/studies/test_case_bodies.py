@@ -265,7 +265,11 @@ def test_what_does_not_go_together_is_refused(name, setting):
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("[[contact]]", "[[contact]]\nheld = true", "[[contact]] has held, and [layer] is a law"),
+        (
+            "[[contact]]",
+            "[[contact]]\nroller = true",
+            "[[contact]] has roller, and [layer] is a law",
+        ),
         ("[layer]", "[gravity]\n[layer]", "[gravity] does not go with [layer], which does not"),
         (r"[[contact]]", None, "[layer] has no effect, as nothing touches without [[contact]]"),
     ],

@@ -38,7 +38,7 @@ acceleration = 10.0
 
 [[contact]]
 facets = "left"
-held = true
+roller = true
 
 [[record]]
 type = "Resultants"

@@ -33,7 +33,7 @@ E = 2.0e7
 nu = 0.3
 rho = 2000.0
 [system]
-clamped = "bottom"
+fixed = "bottom"
 [[contact]]
 facets = "top"
 obstacle = {type = "HalfSpace", point = [0.0, 2.0], normal = [0.0, -1.0]}
@@ -109,9 +109,9 @@ def test_every_path_is_relative_to_the_case_file(
     [
         ("meshes/block.msh", "meshes/none.msh", "none.msh does not exist"),
         (
-            'clamped = "bottom"',
-            'clamped = "botom"',
-            "[system] clamped is 'botom', but the mesh has no group 'botom'",
+            'fixed = "bottom"',
+            'fixed = "botom"',
+            "[system] fixed is 'botom', but the mesh has no group 'botom'",
         ),
         ('facets = "top"', 'facets = "topp"', "[contact[1]] facets is 'topp'"),
         (

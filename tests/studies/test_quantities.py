@@ -154,7 +154,7 @@ nu = 0.3
 rho = "1.8 t/m3"
 
 [system]
-clamped = "bottom"
+fixed = "bottom"
 initial_velocity = ["0.1*y", "0"]
 
 [[system.loads]]

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.serial
 SENTENCES = {
     "a law by a keyword": (
         "give the problem mass=ConsistentMass()",
-        'give the problem [mass] type = "ConsistentMass"',
+        'give [mass] type = "ConsistentMass"',
     ),
     "a key of a table": (
         "or use matching=DualMortar()",
@@ -149,3 +149,33 @@ def test_an_unknown_option_is_told_under_the_usage_of_its_command(
     said = capsys.readouterr().err
     assert said.startswith("usage: vi-contact motion info")
     assert "unknown option: --nonsense" in said
+
+
+OLD = CORNER.replace('[[contact]]\nfacets = "right"', '[[contact]]\nheld = true\nfacets = "right"')
+
+
+def test_old_keys_are_read_with_one_warning_that_names_the_new(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Of tables, of stages and of settings; the case is that of the new keys."""
+    stage = '\n[[stage]]\nname = "rest"\ntype = "static"\nsystem = {clamped = "bottom"}\n'
+    old = OLD.replace("[run]\ndt = 0.01\nsteps = 1\n", "") + stage
+    cases = []
+    for text in (old, old.replace("clamped", "fixed").replace("held", "roller")):
+        case = tmp_path / "case.toml"
+        case.write_text(text)
+        cases.append(read_case(case, ["contact.1.held=true"]))
+    assert cases[0].tables == cases[1].tables and cases[0].settings == ("contact.1.roller=true",)
+    warnings = [record.message.partition(": ")[2] for record in caplog.records]
+    assert warnings == [
+        "[contact] held is now roller: write that",
+        "[system] clamped is now fixed: write that",
+        "[contact] held is now roller: write that",
+    ]
+
+
+def test_a_key_under_both_names_is_refused(tmp_path: Path) -> None:
+    case = tmp_path / "case.toml"
+    case.write_text(CORNER + '[system]\nclamped = "left"\nfixed = "right"\n')
+    with pytest.raises(InputError, match=r"\[system\] has 'fixed' and 'clamped', .* old name"):
+        read_case(case)

@@ -60,6 +60,7 @@ from .bodies import (
 )
 from .expressions import check_axes
 from .library import check_format, find_base_folder, keep_copy, refuse_case_of_others
+from .old_keys import renew_keys
 from .own_classes import check_packages
 from .parsing import Words, read, read_arguments, suggest_nearest
 from .sentences import in_words_of_case_files
@@ -81,7 +82,7 @@ TABLES: dict[str, Any] = {
     "beam": BeamBody,
     "particle": ParticleBody,
     "material": Mapping[str, LinearElastic | Orthotropic | Heterogeneous],
-    "system": make_callee(assemble),
+    "system": make_callee(assemble, keys={"clamped": "fixed"}),
     "strain_compatible": CALL,
     "contact": ContactSurface | Sequence[ContactSurface],
     "layer": LayerLaw,
@@ -150,8 +151,11 @@ class Case:
         for table, node in self.nodes.items():
             if table not in need_mesh and not needs_body(node):
                 self._build_table(table)
-        if not needs_body(self.nodes["run"]):
+        run = self.nodes["run"]
+        if not needs_body(run):
             self._check_steps(self._build_table("run"))
+        elif "steps" in run.arguments:  # the time step is known with the body only
+            self._check_steps({"dt": 1.0, "steps": run.arguments["steps"]})
         if self.body is not None:
             self._build_body_problem(self.body)
 
@@ -494,7 +498,7 @@ def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence
     """
     check_type("read_case", "path", path, str | Path)
     path = Path(path)
-    tables = read_toml(path)
+    tables, settings = renew_keys(path, read_toml(path), settings)
     case = _read_tables(path, with_settings(tables, settings), settings, allow)
     unread = _collect_unread(case)
     if unread:

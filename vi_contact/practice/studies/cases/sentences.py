@@ -30,6 +30,10 @@ PHRASES = {
     "restart=True": "--restart",
 }
 _PROBE = re.compile(r"Probe: points\['(\w+)'\]:")  # a point of the recorder
+# what the name of a table says once more
+_TWICE = re.compile(
+    r"the (?:(?:default )?(?:(?:impact |friction )?law|scheme|solver)|problem) (?=\[)"
+)
 _PACKAGES = "(?:(?:vc|fem|laws|meshes|soil)\\.)?"
 _CALL = re.compile(rf"(?<![\w.'])(?:[a-z_]+=)?{_PACKAGES}([A-Z]\w*(?:\.\w+)?)\(")
 _KEYWORD = re.compile(r"(?<![\w./'\-])([a-z_]\w*)=(?![=\w])(…|\.\.\.)?")
@@ -50,6 +54,7 @@ def write_for_case_files(text: str) -> str:
             continue
         text = text[: match.start()] + words + text[end:]
         place = match.start() + len(words)
+    text = _TWICE.sub("", text)
     text = _VALUE.sub(lambda match: f"{match[1]} = {_write_value(match[2])}", text)
     return _KEYWORD.sub(r"\1 = …", text)
 

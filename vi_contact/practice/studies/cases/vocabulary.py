@@ -132,7 +132,7 @@ def surface(
     obstacle: Obstacle | None = None,
     points: Annotated[Sequence[tuple[float, ...]] | None, Unit("m")] = None,
     feature_angle: Annotated[float, Unit("rad")] = FEATURE_ANGLE,
-    held: bool = False,
+    roller: bool = False,
     springs: Annotated[float | None, Unit("Pa/m")] = None,
     frictionless_corners: bool = False,
     hinges: bool = False,
@@ -146,7 +146,7 @@ def surface(
         obstacle: what it may touch; None: ``Touching()``.
         points: (k, d) [m]; only the nodes nearest to them have conditions; None: all have.
         feature_angle: angle [rad]; facets that turn by less from one another are one smooth face.
-        held: makes it bilateral everywhere.
+        roller: makes it bilateral everywhere: it slides along the face and stays on it.
         springs: foundation modulus [Pa/m] of the springs on which it rests; None: without.
         frictionless_corners: whether nodes with several conditions slide freely over their faces.
         hinges: whether the body may hang together with another one by nodes of this boundary.
@@ -159,7 +159,7 @@ def surface(
         result = result.on_springs(springs)
     if frictionless_corners:
         result = result.with_frictionless_corners()
-    return result.bilateral_everywhere() if held else result
+    return result.bilateral_everywhere() if roller else result
 
 
 def pair(
@@ -170,12 +170,12 @@ def pair(
     matching: Matching | None = None,
     points: Annotated[Sequence[tuple[float, ...]] | None, Unit("m")] = None,
     feature_angle: Annotated[float, Unit("rad")] = FEATURE_ANGLE,
-    held: bool = False,
+    roller: bool = False,
     frictionless_corners: bool = False,
     hinges: bool = False,
     name: str = "",
 ) -> ContactSurface:
-    """Make a ``contact_pair``; held: ``.bilateral_everywhere()``; the others: as of ``surface``.
+    """Make a ``contact_pair``; roller: ``.bilateral_everywhere()``; the others: as of ``surface``.
 
     Args:
         system: of the bodies.
@@ -184,7 +184,7 @@ def pair(
         matching: how side 1 finds side 2; None: ``NodeToNode()``.
         points: as of ``surface``.
         feature_angle: as of ``surface``.
-        held: as of ``surface``.
+        roller: as of ``surface``.
         frictionless_corners: as of ``surface``.
         hinges: as of ``surface``.
         name: as of ``surface``.
@@ -200,7 +200,7 @@ def pair(
     )
     if frictionless_corners:
         result = result.with_frictionless_corners()
-    return result.bilateral_everywhere() if held else result
+    return result.bilateral_everywhere() if roller else result
 
 
 def weight(
