@@ -314,7 +314,7 @@ def test_the_model_as_it_was_described(tmp_path: Path) -> None:
         "bodies": [
             {"name": "wall", "cells": 8, "mass": 1.5e4, "material": {"name": "C30", "E": 3e10}}
         ],
-        "supports": [{"kind": "clamped", "groups": ["base", "toe"], "components": ["x", "y"]}],
+        "supports": [{"kind": "fixed", "groups": ["base", "toe"], "components": ["x", "y"]}],
         "contact": [
             {
                 "name": "stem",

@@ -201,7 +201,7 @@ def test_check_describes_a_beam(tmp_path, capsys):
     assert main(["run", "beam", "--check", "--out", out]) == 0
     said = capsys.readouterr().out
     assert "tip: one point, 0.05 m before the wall; Coulomb(mu=0.3)" in said
-    assert "beam: 200 cells, 5 kg" in said and "start: clamped along x, y" in said
+    assert "beam: 200 cells, 5 kg" in said and "start: fixed along x, y" in said
     assert (tmp_path / "run" / "model.png").stat().st_size > 0
     model = describe(read_case(locate("beam"), SMALL), COMM)
     # of the clamped rod, c = 10 m/s: 4 l/c

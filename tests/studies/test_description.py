@@ -88,9 +88,9 @@ def test_numbers_of_two_blocks(shared_tmp: Path) -> None:
     assert free["bodies"][0]["material"] == {"type": "LinearElastic", "E": E, "nu": 0.0, "rho": RHO}
     assert {"name": "upper_left", "kind": "facets"} in free["groups"] and len(free["groups"]) == 10
     assert [(one["kind"], one["groups"], one["components"]) for one in free["supports"]] == [
-        ("clamped", ["lower_bottom"], ["x", "y"]),
-        ("held", ["lower_left"], ["x"]),
-        ("held", ["lower_right"], ["x"]),
+        ("fixed", ["lower_bottom"], ["x", "y"]),
+        ("roller, fixed", ["lower_left"], ["x"]),
+        ("roller, fixed", ["lower_right"], ["x"]),
         ("Dashpots", ["upper_top"], ["x", "y"]),
     ]
     (contact,) = free["contact"]
@@ -250,7 +250,7 @@ def test_a_sketch_shows_what_holds_and_touches(tmp_path: Path, d: int) -> None:
     (axis,) = sketch(model).axes
     names = [one.get_text() for one in axis.get_legend().get_texts()]
     letters = ", ".join("xyz"[:d])
-    assert names[0] == f"clamped {letters}: lower_{'left' if d == 1 else 'bottom'}" and names[
+    assert names[0] == f"fixed {letters}: lower_{'left' if d == 1 else 'bottom'}" and names[
         -1
     ].startswith("contact")
     assert len(model["outline"]) == {1: 2, 2: 9, 3: 2}[d]

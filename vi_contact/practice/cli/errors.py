@@ -91,7 +91,8 @@ def _spell_options(text: str, spelling: Mapping[str, str]) -> str:
     for argument, option in spelling.items():
         # with a blank after it first, or two blanks would be left
         text = text.replace(f" {argument}= ", f" {option} ")
-        text = text.replace(f" {argument} = … ", f" {option} ")  # as sentences of case files have it
+        # as sentences of case files have it
+        text = text.replace(f" {argument} = … ", f" {option} ")
         text = text.replace(f" {argument}=", f" {option} ")
     return text.rstrip()
 

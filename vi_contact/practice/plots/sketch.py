@@ -14,7 +14,7 @@ LINES = ("tab:green", "tab:blue", "tab:purple", "tab:brown", "tab:olive", "tab:c
 # Kind of node of a contact boundary -> marker and its colour.
 MARKS = {
     "shared by both sides": ("s", "black"),
-    "clamped": ("^", "black"),
+    "fixed": ("^", "black"),
     "prescribed": ("v", "black"),
     "tied to another": ("D", "black"),
     "partly covered": ("o", "tab:blue"),

@@ -375,11 +375,11 @@ def _describe_body(
     outline = [
         {"group": name, "lines": np.concatenate(ends).tolist()} for name, ends in lines.items()
     ]
-    clamped = {"kind": "clamped", "groups": ["start"], "components": ["x", "y"][:d]}
+    fixed = {"kind": "fixed", "groups": ["start"], "components": ["x", "y"][:d]}
     return {
         "degree": 1,
         "mass": parts[0]["mass"],
         "bodies": parts,
-        "supports": [clamped],
+        "supports": [fixed],
         "outline": outline,
     }

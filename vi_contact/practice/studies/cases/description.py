@@ -338,7 +338,7 @@ def _describe_supports(space: Any) -> Iterator[dict[str, Any]]:
     Ties of sides to each other are among it.
     """
     for support in space.prescribed:
-        kind = "clamped" if support.components is None else "held"
+        kind = "fixed" if support.components is None else "roller, fixed"
         if support.moves:
             kind = "moved"
         yield _describe_support(space, kind, [support.name], support.components)
