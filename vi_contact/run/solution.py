@@ -56,7 +56,7 @@ RUN = (
     Line("halved steps", "{halved_steps}", "halved_steps"),
     Line(
         "steps in contact",
-        "{steps_in_contact}, largest uplift {largest_uplift:.3f}",
+        "{steps_in_contact}, largest open share {largest_uplift:.3f}",
         "steps_in_contact",
     ),
     Line("smallest gap", "{smallest_gap:.3e} m", "steps_in_contact"),

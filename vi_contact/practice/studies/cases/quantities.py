@@ -26,7 +26,8 @@ _NUMBER = r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _VALUE = re.compile(rf"(?<![\w.\s])\s*((?>{_NUMBER}))\s*((?:1\s*/\s*)?{NAME}[^()+]*)")
 # arithmetic of numbers alone with a unit behind it: "50*9.81 kN/m2"
 _ARITHMETIC = re.compile(
-    rf"((?>(?:[-+*/^().\d\s]|(?<=[\d.])[eE](?=[-+\d]))+))(?<=\s)({NAME}[^()+]*)", re.ASCII
+    rf"(?<![-+*/^().\w\s])((?>(?:[-+*/^().\d\s]|(?<=[\d.])[eE](?=[-+\d]))+))(?<=\s)({NAME}[^()+]*)",
+    re.ASCII,
 )
 
 
