@@ -52,15 +52,6 @@ def build_parser(command: str = "") -> argparse.ArgumentParser:
     return top
 
 
-def parse_words(words: Sequence[str]) -> argparse.Namespace:
-    """Parse the words of a command; an unknown option is told under the usage of its command."""
-    parser = build_parser(words[0] if words else "")
-    options, unknown = parser.parse_known_args(words)
-    if unknown:
-        options.parser.error(f"unknown option: {' '.join(unknown)}")
-    return options
-
-
 def split_petsc(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
     """Return (our own arguments, PETSc options).
 
@@ -89,7 +80,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     own, petsc = split_petsc(sys.argv[1:] if arguments is None else arguments)
 
     def command() -> None:
-        options = parse_words(own)
+        options = build_parser(own[0] if own else "").parse_args(own)
         if petsc:
             import petsc4py
 

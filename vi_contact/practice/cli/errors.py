@@ -50,6 +50,13 @@ def check_words(arguments: Sequence[str]) -> None:
 class Parser(argparse.ArgumentParser):
     """Parse as argparse does, with sentences that stay short where a word is long."""
 
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse as argparse does; an unknown option is told under the usage of its command."""
+        options, unknown = self.parse_known_args(args, namespace)
+        if unknown:
+            getattr(options, "parser", self).error(f"unknown option: {' '.join(unknown)}")
+        return options
+
     def error(self, message: str) -> NoReturn:
         """Print usage and message, and end the program."""
         words = " ".join(word[:SHOWN] for word in message.split())
