@@ -137,7 +137,7 @@ def test_pages_of_a_channel(
     axes, words = pages(run, tmp_path / "page.pdf", monkeypatch, sections)
     assert [one.title for one in sections] == [
         "Ground motion",
-        "Base shear, thrust, uplift and sliding",
+        "Base shear, thrust, open share and sliding",
         "Accelerations, low-passed and raw",
         "Histories",
         "Certificate and energies in words",

@@ -23,7 +23,7 @@ SUMMARY = {
 CHARTS = {
     "displacement": ("u_",),
     "contact force": ("contact_resultant", "N_", "contact_force_"),
-    "uplift ratio": ("contact_uplift", "uplift_"),
+    "open share": ("contact_uplift", "uplift_"),
     "force of the support": ("reaction_x_", "reaction_y_", "reaction_z_"),
     "racking and rocking": ("racking_", "theta_"),
     "shear force": ("V_",),
@@ -40,7 +40,7 @@ RESULTS = {
     "shear on a part": ("T_",),
     "height of the thrust, when the thrust is largest": ("height_",),
     "height of the thrust over the height of the part, when the thrust is largest": ("level_",),
-    "uplift ratio": ("contact_uplift", "uplift_"),
+    "open share": ("contact_uplift", "uplift_"),
     "largest slip": ("contact_max_slip", "slip_"),
     "mean sliding; its end less its start is what remains": ("sliding_",),
     "eccentricity of the thrust from the middle of its part": ("e_",),
