@@ -250,8 +250,8 @@ def model_of(**more: Any) -> dict[str, Any]:
             {"name": "rock", "material": {"type": "Own"}},
         ],
         "supports": [
-            {"kind": "clamped", "groups": ["rock_bottom"], "components": ["x", "y"]},
-            {"kind": "held", "groups": ["left_side"], "components": ["x"]},
+            {"kind": "fixed", "groups": ["rock_bottom"], "components": ["x", "y"]},
+            {"kind": "roller, fixed", "groups": ["left_side"], "components": ["x"]},
         ],
         "contact": [{"name": "joint", "places": base}],
         "outline": [

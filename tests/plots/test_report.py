@@ -140,7 +140,7 @@ def test_pages_of_a_channel(
     axes, words = pages(run, tmp_path / "page.pdf", monkeypatch, sections)
     assert [one.title for one in sections] == [
         "Ground motion",
-        "Base shear, thrust, uplift and sliding",
+        "Base shear, thrust, open share and sliding",
         "Accelerations, low-passed and raw",
         "Histories",
         "Solver, certificate and energies",
@@ -317,7 +317,7 @@ def test_the_model_as_it_was_described(tmp_path: Path) -> None:
         "bodies": [
             {"name": "wall", "cells": 8, "mass": 1.5e4, "material": {"name": "C30", "E": 3e10}}
         ],
-        "supports": [{"kind": "clamped", "groups": ["base", "toe"], "components": ["x", "y"]}],
+        "supports": [{"kind": "fixed", "groups": ["base", "toe"], "components": ["x", "y"]}],
         "contact": [
             {
                 "name": "stem",
@@ -339,7 +339,7 @@ def test_the_model_as_it_was_described(tmp_path: Path) -> None:
     rows = [row for table in section.tables for row in table.rows]
     assert ("mass", "15", "t", "") in rows
     assert ("wall: Young's modulus E", "30", "GPa", "") in rows
-    assert ("base, toe", "clamped", "-", "along x, y") in rows
+    assert ("base, toe", "fixed", "-", "along x, y") in rows
     assert ("stem: area", "4", "m²", "") in rows
     assert ("natural period T2, contact closed", "0.25", "s", "") in rows
     _, written = report(folder, out=tmp_path / "page.pdf")

@@ -56,13 +56,13 @@ nu = 0.2
 rho = 2000.0
 xi = "5 %"
 [system]
-clamped = "lower_bottom"
+fixed = "lower_bottom"
 damping = {type = "DampingRatio", frequency = 20.0}
 [[contact]]
 type = "contact_pair"
 facets1 = "upper_bottom"
 facets2 = "lower_top"
-held = true
+roller = true
 [friction]
 type = "Coulomb"
 mu = 0.5

@@ -205,7 +205,7 @@ def test_check_describes_a_beam(tmp_path, capsys):
     assert ["tip:", "gap", "at", "the", "start", "50", "mm"] in lines
     assert ["tip:", "friction", "mu", "=", "0.3", "Coulomb"] in lines
     assert ["beam:", "mass", "0.005", "t", "200", "cells"] in lines
-    assert ["start", "clamped", "along", "x,", "y"] in lines
+    assert ["start", "fixed", "along", "x,", "y"] in lines
     assert ["body_force", "20", "N/m", "20", "at", "the", "start,"] in [one[:7] for one in lines]
     assert (tmp_path / "run" / "model.png").stat().st_size > 0
     model = describe(read_case(locate("beam"), SMALL), COMM)
@@ -271,7 +271,11 @@ def test_what_does_not_go_together_is_refused(name, setting):
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("[[contact]]", "[[contact]]\nheld = true", "[[contact]] has held, and [layer] is a law"),
+        (
+            "[[contact]]",
+            "[[contact]]\nroller = true",
+            "[[contact]] has roller, and [layer] is a law",
+        ),
         ("[layer]", "[gravity]\n[layer]", "[gravity] does not go with [layer], which does not"),
         (r"[[contact]]", None, "[layer] has no effect, as nothing touches without [[contact]]"),
     ],

@@ -39,7 +39,7 @@ acceleration = 10.0
 
 [[contact]]
 facets = "left"
-held = true
+roller = true
 
 [[record]]
 type = "Resultants"

@@ -35,7 +35,7 @@ upper = {lengths = [0.25, 2.0], divisions = [1, 8]}
 lower = {E = 1.8e9, nu = 0.0, rho = 2000.0}
 upper = {E = 1.8e9, nu = 0.0, rho = 2000.0}
 [system]
-clamped = "lower_bottom"
+fixed = "lower_bottom"
 prescribed = [{facets = "lower_left", components = [0]}, {facets = "lower_right", components = [0]}]
 dashpots = [{facets = "upper_top", normal = 0.1}]
 [gravity]
@@ -90,9 +90,9 @@ def test_numbers_of_two_blocks(shared_tmp: Path) -> None:
     assert free["bodies"][0]["material"] == {"type": "LinearElastic", "E": E, "nu": 0.0, "rho": RHO}
     assert {"name": "upper_left", "kind": "facets"} in free["groups"] and len(free["groups"]) == 10
     assert [(one["kind"], one["groups"], one["components"]) for one in free["supports"]] == [
-        ("clamped", ["lower_bottom"], ["x", "y"]),
-        ("held", ["lower_left"], ["x"]),
-        ("held", ["lower_right"], ["x"]),
+        ("fixed", ["lower_bottom"], ["x", "y"]),
+        ("roller, fixed", ["lower_left"], ["x"]),
+        ("roller, fixed", ["lower_right"], ["x"]),
         ("Dashpots", ["upper_top"], ["x", "y"]),
     ]
     (contact,) = free["contact"]
@@ -120,7 +120,7 @@ def test_numbers_of_two_blocks(shared_tmp: Path) -> None:
     assert gap["rigid_motions"] == 1
     assert gap["periods"][0] == pytest.approx(axial(1, HEIGHT / 2, CELLS // 2), rel=1e-8)
     across = described(
-        path, COMM, f"system.prescribed=[{held}]", "mesh.gap=0.1", "contact.1.held=true"
+        path, COMM, f"system.prescribed=[{held}]", "mesh.gap=0.1", "contact.1.roller=true"
     )
     assert (
         across["periods"] == pytest.approx(closed["periods"], rel=1e-8)
@@ -334,7 +334,7 @@ def test_motions_of_a_compliant_base_are_records(tmp_path: Path, motion: str) ->
         f'{{type = "CompliantBase", {one}' for one in (base, base.replace("_bottom", "_left"))
     )
     text = re.sub(r"\[\[excitation\]\].*?\n(?=\[run\])", "", BLOCKS, flags=re.DOTALL)
-    text = re.sub("clamped = .*\nprescribed = .*\n", "", text).replace(
+    text = re.sub("fixed = .*\nprescribed = .*\n", "", text).replace(
         "dashpots = [", f"dashpots = [{bases}"
     )
     model = described(written(tmp_path, text.replace("dt = 0.002", "dt = 0.02")))
@@ -370,7 +370,7 @@ offset = [6.4]
 lower = {E = 5e7, nu = 0.3, rho = 1900.0}
 upper = {E = 3e10, nu = 0.2, rho = 2500.0}
 [system]
-clamped = ["lower_bottom", "lower_left"]
+fixed = ["lower_bottom", "lower_left"]
 [gravity]
 cells = "upper"
 [[contact]]

@@ -184,7 +184,7 @@ def test_pier_rocks_within_the_moment_that_overturns_it(tmp_path: Path) -> None:
         "fields=",
         "material.raft.E=3e14",
         "material.deck.E=3e14",
-        'system.clamped=["rock", "raft_bottom"]',
+        'system.fixed=["rock", "raft_bottom"]',
     ]
     system = read_case(STARTERS / "pier.toml", clamped).parts(MPI.COMM_SELF).system
     assert engineering.lowest_frequency(system) == pytest.approx(beam_with_deck(), rel=0.01)

@@ -29,7 +29,7 @@ E = 1e6
 nu = 0.3
 rho = 1000.0
 [system]
-clamped = "base"
+fixed = "base"
 [[contact]]
 facets = "face"
 obstacle = {type = "HalfSpace", point = [2.001, 0.0], normal = [-1.0, 0.0]}

@@ -21,6 +21,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.algebra import EffectiveMatrix, largest, max_abs
+from ..core.certificate import Certificate
 from ..core.checks import describe_point, number, quote, real
 from ..core.collective import Parts, agree, together
 from ..core.errors import InputError
@@ -131,13 +132,19 @@ class Equilibria:
         self._K = EffectiveMatrix(
             system.K, system.algebra, space=system.space, inertia=(0.0, system.M)
         )
-        self._solve: Callable[[StepProblem], StepResult]
+        self._solve: Callable[[StepProblem], tuple[StepResult, Certificate]]
         refuse_matrix(problem, self._K)
         if system.floating:
-            self._solve = Proximal(problem, self._K, solver, tolerance).solve
+            proximal = Proximal(problem, self._K, solver, tolerance)
+
+            def approach(step: StepProblem) -> tuple[StepResult, Certificate]:
+                result = proximal.solve(step)
+                return result, proximal.certificate(result)
+
+            self._solve = approach
         else:
             certified = CertifiedSolver(problem, self._K, 1.0, [solver], tolerance, advice=ADVICE)
-            self._solve = lambda step: certified.solve(step)[0]
+            self._solve = lambda step: certified.solve(step)[:2]
 
     def solve(self, old: State, t: float) -> State:
         """Return the equilibrium at a time. Collective.
@@ -164,9 +171,18 @@ class Equilibria:
                 slip0=problem.slip_origin(old.u, old.t, t),
             )
             refuse_nan(step, lambda: problem.static_load)
-            result = self._solve(step)
+            result, certificate = self._solve(step)
         rest = np.zeros_like(old.u)
-        return State(t, old.k, result.x, rest, result.r_n, result.active, r_t=result.r_t)
+        return State(
+            t,
+            old.k,
+            result.x,
+            rest,
+            result.r_n,
+            result.active,
+            r_t=result.r_t,
+            certificate=certificate.worst,
+        )
 
 
 def quasi_static(

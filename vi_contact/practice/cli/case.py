@@ -199,8 +199,6 @@ def _run(options: argparse.Namespace) -> str:
     timing.show_on_terminal(not options.quiet)
     if options.wall_time is not None:
         parse_wall_time(options.wall_time)
-    if options.steps is not None and options.steps < 1:
-        raise InputError(f"--steps {options.steps}: give at least one step")
     case = _read_case(options, path)
     out = options.out or case.out or Path("results") / path.stem
     if options.check:

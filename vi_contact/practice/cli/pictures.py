@@ -99,7 +99,7 @@ def _add_plot(commands: Any) -> None:
         metavar="T[,T...]",
         help=(
             "moments to draw [s] (default: the first, the last, and the one of the "
-            "largest uplift, contact pressure or displacement)"
+            "largest open share, contact pressure or displacement)"
         ),
     )
     plot.add_argument(
@@ -127,7 +127,7 @@ def _add_film(commands: Any) -> None:
         dest="times",
         help=(
             "first and last moment of the film [s] (default: 48 frames around the moment "
-            "of the largest uplift, contact pressure or displacement)"
+            "of the largest open share, contact pressure or displacement)"
         ),
     )
     film.add_argument(
@@ -139,7 +139,7 @@ def _add_film(commands: Any) -> None:
         "--column",
         metavar="COLUMN",
         help=(
-            "column of history.csv that is drawn below the bodies (default: the uplift, "
+            "column of history.csv that is drawn below the bodies (default: the open share, "
             "the contact pressure or the first displacement that changes)"
         ),
     )

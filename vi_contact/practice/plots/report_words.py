@@ -48,7 +48,7 @@ RESULTS = {
     "shear on a part": ("T_",),
     "height of the thrust, when the thrust is largest": ("height_",),
     "height of the thrust over the height of the part, when the thrust is largest": ("level_",),
-    "uplift ratio": ("contact_uplift", "uplift_"),
+    "open share": ("contact_uplift", "uplift_"),
     "largest slip": ("contact_max_slip", "slip_"),
     "mean sliding; its end less its start is what remains": ("sliding_",),
     "eccentricity of the thrust from the middle of its part": ("e_",),

@@ -171,7 +171,7 @@ def _tabulate_results(run: RunFolder, numbers: ReportNumbers) -> Section:
     safety = list(_list_safety(run))
     tables = [Table(HEADERS["results"], results), Table(HEADERS["safety"], safety)]
     return Section(
-        "Base shear, thrust, uplift and sliding",
+        "Base shear, thrust, open share and sliding",
         [SAY["safety"]] if safety else [],
         [table for table in tables if table.rows],
     )

@@ -25,12 +25,10 @@ HOLDS = (
     ("#5f6b1e", (0, (2.5, 1))),
     ("#127a8a", (0, (8, 2))),
 )
-# Words of model.json -> those of the trade.
-KINDS = {"clamped": "fixed", "held": "roller"}
 # Kind of node of a contact boundary -> marker and its colour.
 MARKS = {
     "shared by both sides": ("s", "black"),
-    "clamped": ("^", "black"),
+    "fixed": ("^", "black"),
     "prescribed": ("v", "black"),
     "tied to another": ("D", "black"),
     "partly covered": ("o", "tab:blue"),
@@ -163,9 +161,8 @@ def _name_supports(
     nowhere = np.full((max(d, 2), 1), np.nan)
     for k, support in enumerate(supports):
         colour, dash = HOLDS[k % len(HOLDS)]
-        kind = KINDS.get(support["kind"], support["kind"])
         components = ", ".join(support["components"])
-        label = f"{kind} {components}: {', '.join(support['groups'])}"
+        label = f"{support['kind']} {components}: {', '.join(support['groups'])}"
         axis.plot(*nowhere, lw=3.0, color=colour, ls=dash, label=escape_dollars(label))
         looks |= dict.fromkeys(support["groups"], (colour, dash))
     return looks

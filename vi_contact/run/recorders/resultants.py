@@ -17,9 +17,9 @@ from .contact_parts import DETERMINED, Part, Where, check_part
 
 # Quantity -> (unit, meaning).
 _MEANING: Columns = {
-    "uplift": ("-", "uplift ratio 1 - L_contact/L"),
+    "uplift": ("-", "open share 1 - L_contact/L"),
     "opening": ("m", "largest gap"),
-    "slip": ("m", "largest tangential displacement on the support"),
+    "slip": ("m", "largest tangential displacement along the ground"),
     "force": ("N", "contact force on the body"),
     "N": ("N", "normal force -F·n, compression positive"),
     "T": ("N", "tangential force F·t on the body"),
@@ -33,12 +33,12 @@ _MEANING: Columns = {
             "determine it"
         ),
     ),
-    "settlement": ("m", "mean displacement towards the support"),
+    "settlement": ("m", "mean displacement towards the ground"),
     "level": (
         "-",
         ("height of the thrust above the lowest point over the height of the part; nan while open"),
     ),
-    "sliding": ("m", "mean tangential displacement on the support; in space its size"),
+    "sliding": ("m", "mean tangential displacement along the ground; in space its size"),
     "margin": ("-", "share of the friction that is left, 1 - |T|/limit; nan while open"),
     "pressure_low": ("Pa", "contact pressure at the end where the longest coordinate is least"),
     "pressure_high": ("Pa", "contact pressure at the end where the longest coordinate is largest"),

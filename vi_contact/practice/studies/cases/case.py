@@ -64,8 +64,10 @@ from .bodies import (
 from .expressions import check_axes
 from .friction_of_tables import join_laws, list_contacts, list_laws
 from .library import check_format, find_base_folder, keep_copy, refuse_case_of_others
+from .old_keys import renew_keys
 from .own_classes import check_packages
 from .parsing import Words, read, read_arguments, suggest_nearest
+from .sentences import in_words_of_case_files
 from .stage_tables import Stage, split_stages
 from .stages import Reached, run_stages
 from .strain_compatible import CALL, iterate, with_known_damping
@@ -84,7 +86,7 @@ TABLES: dict[str, Any] = {
     "beam": BeamBody,
     "particle": ParticleBody,
     "material": Mapping[str, LinearElastic | Orthotropic | Heterogeneous],
-    "system": make_callee(assemble),
+    "system": make_callee(assemble, keys={"clamped": "fixed"}),
     "strain_compatible": CALL,
     "contact": ContactSurface | Sequence[ContactSurface],
     "layer": LayerLaw,
@@ -142,6 +144,7 @@ class Case:
         """Return what shakes the body; record files are read here."""
         return self._build_tables("excitation", **context)
 
+    @in_words_of_case_files()
     def check(self) -> None:
         """Make everything that needs no mesh.
 
@@ -154,8 +157,11 @@ class Case:
             if table not in need_mesh and not needs_body(node):
                 self._build_table(table)
         self.list_friction()
-        if not needs_body(self.nodes["run"]):
+        run = self.nodes["run"]
+        if not needs_body(run):
             self._check_steps(self._build_table("run"))
+        elif "steps" in run.arguments:  # the time step is known with the body only
+            self._check_steps({"dt": 1.0, "steps": run.arguments["steps"]})
         if self.body is not None:
             self._build_body_problem(self.body)
 
@@ -169,6 +175,7 @@ class Case:
         except InputError as error:
             raise InputError(f"{self.path}: [run] {error}") from None
 
+    @in_words_of_case_files()
     def problem(self, comm: Any, parts: Parts | None = None) -> ContactProblem:
         """Return the contact problem; ``parts``: those of ``parts``, when they are known.
 
@@ -191,6 +198,7 @@ class Case:
             return arguments
         return arguments | {"t_end": self._find_duration(parts)}
 
+    @in_words_of_case_files()
     def columns(self, comm: Any, parts: Parts | None = None) -> frozenset[str]:
         """Return the columns that a run writes into history.csv; computes no step.
 
@@ -223,6 +231,7 @@ class Case:
         """Return the recorders of [[record]]; None for those of ``simulate``."""
         return self._build_tables("record", tags=parts.tags) if "record" in self.nodes else None
 
+    @in_words_of_case_files()
     def run(
         self,
         comm: Any,
@@ -455,6 +464,7 @@ class Case:
                 f"{error}"
             ) from error
 
+    @in_words_of_case_files()
     def parts(self, comm: Any) -> Parts:
         """Return what the problem is made of; collective."""
         if self.body is not None:
@@ -565,7 +575,7 @@ def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence
     """
     check_type("read_case", "path", path, str | Path)
     path = Path(path)
-    tables = read_toml(path)
+    tables, settings = renew_keys(path, read_toml(path), settings)
     case = _read_tables(path, with_settings(tables, settings), settings, allow)
     unread = _collect_unread(case)
     if unread:

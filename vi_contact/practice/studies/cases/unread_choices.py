@@ -38,7 +38,7 @@ OF_CONTACT = {  # what does not happen
 STRAIGHT = {"rod_problem": "the tip of a rod", "particle_problem": "a particle"}
 MASSES = ("ConsistentMass", "Redistributed")
 WITHOUT_RATES = ("Coulomb", "Tresca")
-SUPPORTS = ("clamped", "prescribed", "tied", "dashpots")
+SUPPORTS = ("fixed", "prescribed", "tied", "dashpots")
 AT_START = ("initial_displacement", "initial_velocity")
 Finding = tuple[str, str]  # the key that is in vain, and the sentence
 

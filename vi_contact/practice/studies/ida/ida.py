@@ -47,6 +47,8 @@ SHARES = (0.16, 0.50, 0.84)  # of the records below the curves of the figure
 TABLE = "ida.csv"
 COLUMNS = "columns.json"
 FIGURE = "ida.png"
+DIGITS = 12  # of an intensity: rounding beyond them would print a level of 1 as 0.9999999999999999
+STRETCHED = 4.0  # a record that is multiplied by more is no longer like a quake of that strength
 STUDY = "ida.json"
 RUNS = "runs"
 FRAGILITY = "fragility.csv"
@@ -220,6 +222,7 @@ def run_ida(
         left = [run for run in mine if run.read_finished() is None]
         if left:
             _check_demands(study)
+        _tell_stretched(left, say)
         say(
             f"{len(every)} runs, {len(mine)} of them here, {len(mine) - len(left)} finished already"
         )
@@ -271,6 +274,20 @@ class _Progress:
         reason = f": {row['reason']}" if row["reason"] else ""
         self._say(
             f"[{self._number}/{self._count}] {row['record']} x {factor}: {row['status']}{reason}"
+        )
+
+
+def _tell_stretched(runs: Sequence[OneRun], say: Callable[[str], None]) -> None:
+    """Say which records are multiplied by more than STRETCHED, and by how much at most."""
+    factors: dict[str, float] = {}
+    for run in runs:
+        if run.factor > STRETCHED:  # NaN is not
+            factors[run.shaking.name] = max(run.factor, factors.get(run.shaking.name, 0.0))
+    if factors:
+        names = ", ".join(f"{name} by up to {factor:.3g}" for name, factor in factors.items())
+        say(
+            f"records are multiplied by more than {STRETCHED:g}: {names}; a strong quake has "
+            "another spectrum than a weak one enlarged, so take stronger records or lower levels"
         )
 
 
@@ -399,7 +416,8 @@ def _tabulate(
             shaking = Shaking(row["record"], tuple(map(Path, row["files"])))
             with suppress(InputError):
                 unscaled = measure.compute(shaking.record(case))
-                measured[measure.name] = unscaled * row["scale"] ** measure.degree
+                intensity = unscaled * row["scale"] ** measure.degree
+                measured[measure.name] = float(f"{intensity:.{DIGITS}g}")
         if row["status"] == "finished":
             history, columns = _read_history(folder, tuple(demand.column for demand in demands))
             for demand in demands:

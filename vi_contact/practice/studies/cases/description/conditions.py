@@ -22,7 +22,7 @@ def describe_supports(space: Any) -> Iterator[dict[str, Any]]:
     Ties of sides to each other are among it.
     """
     for support in space.prescribed:
-        kind = "clamped" if support.components is None else "held"
+        kind = "fixed" if support.components is None else "roller, fixed"
         if support.moves:
             kind = "moved"
         yield _describe_support(space, kind, [support.name], support.components)
@@ -64,7 +64,7 @@ def describe_contact(
             "points": int(b - a),
             "size": float(whole.weights[a:b].sum()),
             "gaps": _find_gaps(whole.gap0[a:b]),
-            "held": bool(node.arguments.get("held", False)),
+            "held": bool(node.arguments.get("roller", False)),
             "friction": repr(laws[number]),
             "mu": find_mu(laws[number]),
             "nodes": "" if census is None else census.in_words(),
