@@ -289,7 +289,7 @@ def test_a_sketch_has_sizes_names_and_loads() -> None:
         "dam: E = 25 GPa, 2400 kg/m³",
         "rock",
         "fixed x, y: rock_bottom",
-        "roller x: left_side",
+        "roller, fixed x: left_side",
         "contact: joint",
     ]
 

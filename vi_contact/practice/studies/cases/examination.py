@@ -7,6 +7,7 @@ from typing import Any
 from ....core.algebra import Comm
 from .case import Case
 from .description.model import describe
+from .sentences import in_words_of_case_files
 from .stages import rehearse_stages
 from .strain_compatible import refuse_unfit
 from .vocabulary import Parts
@@ -39,6 +40,7 @@ def examine(case: Case, comm: Any, folder: Path) -> tuple[dict[str, Any], Comm]:
     return model, parts.system.algebra.comm
 
 
+@in_words_of_case_files()
 def _rehearse(case: Case, comm: Any, parts: Parts, folder: Path) -> None:
     """Do what a run does before its first step; collective.
 
