@@ -57,7 +57,7 @@ BUILT_IN = {  # case -> settings of the case that ships with the package, which 
     "a": ["contact.points=[[6.0, 3.0], [6.0, 5.25], [6.0, 7.5]]"],
     "b": [],
     "face": ["contact.points="],
-    "bilateral": ["contact.held=true"],
+    "bilateral": ["contact.roller=true"],
     "free": ["contact="],
 }
 

@@ -181,21 +181,15 @@ def test_closed_streams_are_no_hindrance(folder: Path, tmp_path: Path, closed: s
 
 
 def test_a_reader_that_has_gone_is_no_error(folder: Path, tmp_path: Path) -> None:
-    """As of "| head -1": what was to be done is done; a file that is a stream was not written to
-    its end."""
+    """As of "| head -1": what was to be done is done, quietly; where standard output is the file to
+    write, the status is 128 + SIGPIPE, as shells have it."""
     line = (
         f"$V motion convert {folder}/motion.at2 {tmp_path}/out.txt | true; echo ${{PIPESTATUS[0]}}"
     )
     assert shell(line)[1:] == ("0\n", "")
     assert (tmp_path / "out.txt").read_text().count("\n") > 4000
-    status, said, wrong = shell(
-        f"$V motion convert {folder}/motion.at2 /dev/stdout | true; echo ${{PIPESTATUS[0]}}"
-    )
-    assert (
-        said == "1\n"
-        and "/dev/stdout: cannot be written (Broken pipe)" in wrong
-        and "folder" not in wrong
-    )
+    line = f"$V motion convert {folder}/motion.at2 /dev/stdout | true; echo ${{PIPESTATUS[0]}}"
+    assert shell(line)[1:] == ("141\n", "")
 
 
 @pytest.mark.parametrize(

@@ -171,7 +171,7 @@ def test_outside_its_range_no_number_is_claimed() -> None:
     [
         ({"phi": 30.0}, "phi is 30.0; give one from 0 to 1.57 radians; 30 degrees"),
         ({"phi": 0.5, "height": -1.0}, "height is -1.0; give a finite number above zero in m"),
-        ({"phi": 0.5, "of": "moment"}, "unknown CoulombWedge: of 'moment'"),
+        ({"phi": 0.5, "of": "torque"}, "unknown CoulombWedge: of 'torque'"),
         (
             {"phi": 0.5, "surcharge": -1.0},
             "surcharge is -1.0; give zero or a positive finite number in Pa",

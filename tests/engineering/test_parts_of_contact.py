@@ -63,6 +63,26 @@ def test_thrust_of_soil_at_rest(comm: Any) -> None:
     assert upper == above and 0.2 * thrust < upper["N_upper"] < 0.3 * thrust
 
 
+@pytest.mark.parametrize(("toe", "ends"), [(-0.1, ("toe", "heel")), (B, ("heel", "toe"))])
+def test_toe_and_heel_on_either_side(comm: Any, toe: float, ends: tuple[str, str]) -> None:
+    """The columns keep their names and numbers, and their meanings say which end is the toe."""
+    problem, rest, tags = box_of_soil(comm)
+    recorder = vc.Resultants("floor", part=tags["bottom"], toe=(toe, 0.0))
+    plain = vc.Resultants("floor", part=tags["bottom"])
+    assert recorder.start(problem, rest) == pytest.approx(
+        plain.start(problem, rest), nan_ok=True, rel=1e-15
+    )
+    for column, end in zip(("pressure_low_floor", "pressure_high_floor"), ends, strict=True):
+        assert recorder.columns()[column] == (
+            "Pa",
+            f"contact pressure at the {end}, part floor",
+        )
+        assert "longest coordinate" in plain.columns()[column][1]
+    middle = vc.Resultants("floor", part=tags["bottom"], toe=(0.5 * B, 0.0))
+    with pytest.raises(InputError, match="part 'floor': its toe is as near to one end"):
+        middle.start(problem, rest)
+
+
 def test_parts_that_meet_at_a_node_both_have_it(comm: Any) -> None:
     """Boxes add up to the whole where their faces lie between nodes; one more node of thrust K0 rho
     g h y otherwise."""

@@ -19,6 +19,7 @@ from vi_contact.core.errors import InputError
 from vi_contact.practice.engineering.floor_spectra import konno_ohmachi
 from vi_contact.practice.engineering.peak_values import HEADER
 from vi_contact.practice.plots.maps import arc_position, thin_rows
+from vi_contact.run.recorders.contact_parts import Part
 from vi_contact.run.recorders.racking import racking
 
 pytestmark = pytest.mark.serial
@@ -31,6 +32,7 @@ class Points:
     points: Array
     normals: Array
     weights: Array
+    uncovered: Any = None
 
 
 HALVES = np.array([0.5, 1.0, 0.5])
@@ -93,6 +95,16 @@ def test_wall_thrust_and_its_height() -> None:
     assert found["M"][0] == pytest.approx(12.0, rel=1e-14)
     assert np.isnan(found["height"][1]) and np.isnan(found["e"][1])
     assert found["uplift"].tolist() == [0.0, 1.0]
+
+
+def test_ends_of_a_part_are_covered() -> None:
+    """Before the last point there is nothing, so that its 80 N over 0.5 m are no pressure: the end
+    is the point next to it, with 30 N over 1 m. Where no point is covered all of them count."""
+    r_n = np.array([20.0, 30.0, 80.0])
+    for covered, high in (((True, True, False), 30.0), ((False, False, False), 160.0)):
+        geometry = Points(FOOTING.points, FOOTING.normals, FOOTING.weights, ~np.array(covered))
+        part = Part("base", geometry, None, None, None)
+        assert (r_n @ part.ends).tolist() == pytest.approx([40.0, high], rel=1e-14)
 
 
 def test_part_by_position_and_by_direction() -> None:

@@ -21,7 +21,7 @@ def test_clamped_and_listed_nodes_are_told():
     first, second = joined.censuses
     assert (first.name, first.nodes, first.points) == ("bottom", 9, 8)
     assert {kind: points.tolist() for kind, points in first.places.items()} == {
-        "clamped": [[0.0, 0.0]]
+        "fixed": [[0.0, 0.0]]
     }
     assert (second.name, second.nodes, second.points) == ("right", 5, 1)
     assert list(second.places) == ["not listed"]

@@ -186,7 +186,7 @@ E = "150 MPa"
 nu = 0.3
 rho = 1900.0
 [system]
-clamped = "rock"
+fixed = "rock"
 [gravity]
 [[contact]]
 name = "base"
@@ -221,7 +221,7 @@ def test_case_files_are_refused_and_may_mean_hinges(tmp_path):
     case.write_text(RIM)
     with pytest.raises(
         InputError,
-        match=r"'base' and 'ground' share 2 nodes, at \(0, 0\) and \(2, 0\).*hinges = true in",
+        match=r"'base' and 'ground' share 2 nodes, at \(0, 0\) and \(2, 0\).*hinges = true where",
     ):
         read_case(case).problem(MPI.COMM_SELF)
     case.write_text(RIM.replace('facets2 = "ground"', 'facets2 = "ground"\nhinges = true'))

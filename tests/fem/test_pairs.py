@@ -419,7 +419,7 @@ def test_inner_boundaries():
 def test_clamped_nodes_and_directions():
     system, tags = two_blocks(COMM, blocks(2), clamped=lambda tags: tags["upper_left"])
     sentence = (
-        r"contact node \(0, 1\) of 'upper_bottom' is clamped but faces a free node of "
+        r"contact node \(0, 1\) of 'upper_bottom' is fixed but faces a free node of "
         r"'lower_top': make"
     )
     with pytest.raises(InputError, match=sentence):

@@ -57,7 +57,7 @@ def test_a_stone_on_two_stones_has_no_single_partner(d, order):
     with pytest.raises(
         InputError,
         match=r"the node of 'up_bottom' at \(1, 1.*\) faces several nodes of 'a_top\+b_top'.*"
-        r"DualMortar\(\), in a case file matching = \{type = \"DualMortar\"\}",
+        r"use matching=DualMortar\(\)",
     ):
         fem.contact_pair(system, tags["up_bottom"], tops)
     surface = fem.contact_pair(system, tags["up_bottom"], tops, matching=fem.DualMortar())

@@ -277,11 +277,11 @@ def test_clamped_contact_nodes():
     surface = contact_surface(clamped, tags["right"])
     assert seen(surface).count == whole - 1 and seen(surface).points[:, 1].min() > 0.0
     with pytest.raises(
-        InputError, match="no contact nodes: every node of boundary group 'bottom' is also clamped"
+        InputError, match="no contact nodes: every node of boundary group 'bottom' is also fixed"
     ):
         contact_surface(clamped, tags["bottom"])
     with pytest.raises(
-        InputError, match=r"contact point \(2, 0\) is also clamped: leave it out, or clamp less"
+        InputError, match=r"contact point \(2, 0\) is also fixed: leave it out, or fix less"
     ):
         contact_surface(clamped, tags["right"], points=[(2.0, 1.5), (2.0, 0.0)])
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from vi_contact.practice.cli.entry import build_parser
-from vi_contact.run.solution import DEFECT, END, ENERGY, RUN
+from vi_contact.run.solution import DEFECT, END, ENERGY, RUN, STATE
 
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).resolve().parents[2]
@@ -79,7 +79,7 @@ def test_rooms_are_named() -> None:
 
 
 def test_lines_of_the_printed_summary_are_named() -> None:
-    names = {line.name.strip() for line in (*RUN, *ENERGY, *DEFECT, *END)} - {""}
+    names = {line.name.strip() for line in (*RUN, *STATE, *ENERGY, *DEFECT, *END)} - {""}
     assert len(names) > 10 and names - CODE == set()
 
 

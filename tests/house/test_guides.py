@@ -27,9 +27,7 @@ def test_tables_of_the_guides_stand_in_case_files(tmp_path: Path) -> None:
     (system, laws), case = damped.split("\n\n"), house[: house.index("[[stage]]")]
     named = laws.replace('"clay"', '"lower"').replace('"wall"', '"upper"')
     with_laws = (
-        re.sub(
-            r"^\[system\].*\n", f'{system}\nclamped = "lower_bottom"\n', case, flags=re.MULTILINE
-        )
+        re.sub(r"^\[system\].*\n", f'{system}\nfixed = "lower_bottom"\n', case, flags=re.MULTILINE)
         + named
     )
     assert "DampingRatio" in with_laws and named != laws

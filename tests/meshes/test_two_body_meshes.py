@@ -367,7 +367,7 @@ E = 4e10
 nu = 0.2
 rho = 2600.0
 [system]
-clamped = "bottom"
+fixed = "bottom"
 [gravity]
 [[contact]]
 type = "contact_pair"

@@ -204,7 +204,7 @@ def test_every_case_is_a_setting_of_the_one_that_ships():
     settings = {
         "a": f"contact.points={points}",
         "face": "contact.points=",
-        "bilateral": "contact.held=true",
+        "bilateral": "contact.roller=true",
         "free": "contact=",
         "b": "impact.type=Inelastic",
     }

@@ -7,6 +7,7 @@ import json
 import re
 import warnings
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -25,7 +26,9 @@ from vi_contact.practice.cli.entry import main
 from vi_contact.practice.plots.charts import smooth_acceleration
 from vi_contact.practice.plots.pages import write_pages
 from vi_contact.practice.plots.sections import Section, header_facts, sections_of
-from vi_contact.practice.studies.report import report
+from vi_contact.practice.studies.cases.description.tables import input_tables
+from vi_contact.practice.studies.report import _read_model, report
+from vi_contact.practice.units.report_units import ReportUnits
 from vi_contact.run.files.reading import ContactGeometry, RunFolder, read_run
 
 pytestmark = pytest.mark.serial
@@ -137,10 +140,10 @@ def test_pages_of_a_channel(
     axes, words = pages(run, tmp_path / "page.pdf", monkeypatch, sections)
     assert [one.title for one in sections] == [
         "Ground motion",
-        "Base shear, thrust, uplift and sliding",
+        "Base shear, thrust, open share and sliding",
         "Accelerations, low-passed and raw",
         "Histories",
-        "Certificate and energies in words",
+        "Solver, certificate and energies",
         "Peak values of all columns",
     ]
     charts = sum(len(one.charts) + len(one.drawings) for one in sections)
@@ -186,11 +189,11 @@ def test_what_was_not_recorded_has_no_section(solved: tuple[Path, vc.Solution]) 
     found = sections_of(bare, {})
     assert [one.title for one in found] == [
         "Histories",
-        "Certificate and energies in words",
+        "Solver, certificate and energies",
         "Peak values of all columns",
     ]
     assert [chart.title for one in found for chart in one.charts] == [
-        "displacement",
+        "displacement along x",
         "certificate of every step",
     ]
     chosen = sections_of(run, {}, [["N_right", "contact_resultant"]])
@@ -269,8 +272,8 @@ def test_numbers_of_the_report(tmp_path: Path) -> None:
     assert full.x[0] == pytest.approx(0.02) and spectrum.lines[0].x[0] >= 10.0 * dt > full.x[0]
     # stiff oscillators feel the ground's own peak
     assert full.y[0] * G == pytest.approx(2.0, rel=0.02)
-    assert table(found, "Certificate")["kinetic"]["over the largest energy"] == "0.375"
-    (certificate,) = (one for one in found if one.title.startswith("Certificate"))
+    assert table(found, "Solver", 1)["kinetic"]["over the largest energy"] == "0.375"
+    (certificate,) = (one for one in found if one.title.startswith("Solver"))
     assert "1.0e-13 of the largest energy (8 J)" in certificate.sentences[2]
 
 
@@ -314,7 +317,7 @@ def test_the_model_as_it_was_described(tmp_path: Path) -> None:
         "bodies": [
             {"name": "wall", "cells": 8, "mass": 1.5e4, "material": {"name": "C30", "E": 3e10}}
         ],
-        "supports": [{"kind": "clamped", "groups": ["base", "toe"], "components": ["x", "y"]}],
+        "supports": [{"kind": "fixed", "groups": ["base", "toe"], "components": ["x", "y"]}],
         "contact": [
             {
                 "name": "stem",
@@ -331,15 +334,14 @@ def test_the_model_as_it_was_described(tmp_path: Path) -> None:
     }
     folder = write_run(tmp_path / "run", {"u_x_top": ("m", "u", wave)}, dt=0.1, model=model)
     run = read_run(folder)
-    section = sections_of(run, model)[0]
-    assert section.sentences[-2].endswith("at the start: 0.5, 0.25, 0.125 s.")
-    assert section.sentences[-1] == "Warning: dt is long."
-    assert [list(one.header) for one in section.tables] == [
-        ["name", "cells", "mass", "material"],
-        ["kind", "groups", "components"],
-        ["name", "points", "size", "friction"],
-    ]
-    assert section.tables[0].rows[0][-1] == "name = C30, E = 3e+10"
+    section = sections_of(run, model, inputs=input_tables(model, ReportUnits()))[0]
+    assert section.sentences == ["Warning: dt is long."]
+    rows = [row for table in section.tables for row in table.rows]
+    assert ("mass", "15", "t", "") in rows
+    assert ("wall: Young's modulus E", "30", "GPa", "") in rows
+    assert ("base, toe", "fixed", "-", "along x, y") in rows
+    assert ("stem: area", "4", "m²", "") in rows
+    assert ("natural period T2, contact closed", "0.25", "s", "") in rows
     _, written = report(folder, out=tmp_path / "page.pdf")
     assert [path.name for path in written] == ["page.pdf", "peaks.csv", "model.png"]
     deep: Any = []
@@ -348,6 +350,10 @@ def test_the_model_as_it_was_described(tmp_path: Path) -> None:
     for odd in (None, 5, "x", [5], {"a": deep}, deep):
         keys = ("bodies", "supports", "waves", "periods", "mass", "warnings", "records", "contact")
         assert sections_of(run, dict.fromkeys(keys, odd))
+        odd_model = model | {"sides": odd, "box": odd, "loads": odd}
+        (folder / "model.json").write_text(json.dumps(odd_model))
+        with suppress(InputError):  # any other error fails the test
+            _read_model(folder, tmp_path / "model.png")
         (folder / "model.json").write_text(json.dumps(model | {"outline": odd, "contact": odd}))
         with pytest.raises(InputError, match=r"model\.json' is damaged"):
             report(folder, out=tmp_path / "page.pdf")

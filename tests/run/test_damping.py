@@ -3,6 +3,7 @@ is refused."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from vi_contact.practice.cli.entry import main
 from vi_contact.practice.engineering import first_modes
 from vi_contact.practice.ground_motion.record import Record
 from vi_contact.practice.studies import read_case
-from vi_contact.practice.studies.cases.description import describe
+from vi_contact.practice.studies.cases.description.model import describe
 from vi_contact.run.damping import describe_damping
 
 COMM = MPI.COMM_WORLD
@@ -55,13 +56,13 @@ nu = 0.2
 rho = 2000.0
 xi = "5 %"
 [system]
-clamped = "lower_bottom"
+fixed = "lower_bottom"
 damping = {type = "DampingRatio", frequency = 20.0}
 [[contact]]
 type = "contact_pair"
 facets1 = "upper_bottom"
 facets2 = "lower_top"
-held = true
+roller = true
 [friction]
 type = "Coulomb"
 mu = 0.5
@@ -210,8 +211,11 @@ def test_check_and_summary_print_it(tmp_path: Path, capsys: pytest.CaptureFixtur
     checked = capsys.readouterr().out
     assert main(["run", path, "--quiet", "--out", str(out)]) == 0
     printed = capsys.readouterr().out
-    for told in (checked, printed):
-        assert "damping" in told and "5 % at f1 = 20 Hz; " in told and " % at T3 = " in told
+    assert "damping" in printed and "5 % at f1 = 20 Hz; " in printed and " % at T3 = " in printed
+    assert re.search(r"\n  law +5 % at f1 = 20 Hz\n", checked)
+    assert re.search(
+        r"\n  natural period T3, contact closed +[0-9.]+  s +damping [0-9.]+ %\n", checked
+    )
     (written(tmp_path, without_ratios(CASE)))
     assert main(["run", path, "--quiet", "--out", str(out), "--set", "system.damping="]) == 0
     assert "\n  damping                    none\n" in capsys.readouterr().out

@@ -49,7 +49,7 @@ def test_meshes_that_are_not_merged_are_refused() -> None:
     with pytest.raises(
         vc.InputError,
         match=r"nothing holds the body of 25 nodes around \(0.5, 1.5\), and no contact "
-        r"touches it: 5 of its nodes lie at the places of nodes of another body",
+        r"touches it: 5 of its nodes lie where another body has one",
     ):
         run(stacked())
 

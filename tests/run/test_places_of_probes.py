@@ -10,7 +10,7 @@ import pytest
 from fem_problems import CONCRETE, block, linear, max_over_ranks
 
 import vi_contact as vc
-from vi_contact import fem
+from vi_contact import fem, meshes
 from vi_contact.core.errors import InputError
 
 NONE = np.zeros(0)
@@ -107,3 +107,26 @@ def test_a_rotation_is_not_cut_off(comm: Any) -> None:
 
     row = row_of(problem, field, vc.Probe({"c": (0.5, 0.5)}))
     assert max_over_ranks(comm, np.array(list(row.values()))) < 1e-12
+
+
+@pytest.mark.parametrize("nearest", [False, True])
+def test_where_bodies_touch_a_cell_group_tells_whose_point_it_is(comm: Any, nearest: bool) -> None:
+    """Two blocks of which the upper one moves by a metre: at a node and inside a side."""
+    halves = meshes.BlockMesh(lengths=(2.0, 1.0), divisions=(4, 2))
+    mesh, tags = fem.build_mesh(meshes.TwoBlocks(lower=halves, upper=halves), comm)
+    problem = linear(fem.assemble(mesh, CONCRETE))
+    space = problem.system.space
+    upper = np.isin(space.nodes, space.find_nodes_of_cells(tags["upper"].indices))
+    u = space.restrict(np.column_stack([np.zeros(len(upper)), upper]))
+    state = vc.State(0.0, 0, u, 0.0 * u, NONE, np.zeros(0, dtype=bool))
+    for body, moved in (("lower", 0.0), ("upper", 1.0)):
+        points = {"node": (0.5, 1.0), "side": (0.6, 1.0)}
+        probe = vc.Probe(points, nearest=nearest, cells=tags[body])
+        row = probe.start(problem, state)
+        assert row["u_y_node"] == pytest.approx(moved, abs=1e-12)
+        assert row["u_y_side"] == pytest.approx(moved, abs=1e-12)
+
+
+def test_what_is_no_cell_group_is_refused() -> None:
+    with pytest.raises(InputError, match="Probe: cells is 'soil'.*give a cell group"):
+        vc.Probe({"top": (0.0, 1.0)}, cells="soil")

@@ -103,3 +103,29 @@ def test_problems_and_states_are_told_in_a_few_lines(comm: Any) -> None:
         )
         == 1
     )
+
+
+@pytest.mark.serial
+def test_a_run_without_steps_tells_its_state() -> None:
+    """Three springs of 1 kN/m pulled by 6 N stretch by 18 mm: the last mass is stopped by a wall at
+    10 mm, the first moves by 10/3 mm away from one that was 100 mm beside it."""
+    problem = chain_problem(3, gap=0.01, left_gap=0.1, constant=6.0)
+    rest = vc.static_equilibrium(problem)
+    solution = vc.simulate(
+        problem, scheme=vc.Midpoint(), state=rest, dt=1.0, steps=0, progress=False
+    )
+    assert solution.facts["closed_points"] == 1
+    assert solution.facts["largest_opening"] == pytest.approx(0.1 + 0.01 / 3.0, rel=1e-12)
+    assert solution.facts["worst_certificate"] == rest.certificate
+    assert rest.certificate is not None and rest.certificate < 1e-9
+    told = solution.summary()
+    assert told.startswith("state at t = 0 s, without a step, on 1 rank\n")
+    for line in ("closed points              1 of 2", "largest opening            1.033e-01 m"):
+        assert line in told
+    assert "0 steps" not in told and "ledger" not in told
+
+
+@pytest.mark.serial
+def test_a_state_that_nobody_solved_for_has_no_certificate() -> None:
+    solution = vc.simulate(chain_problem(3), scheme=vc.Midpoint(), dt=1.0, steps=0, progress=False)
+    assert "certificate" not in solution.summary()

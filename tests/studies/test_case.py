@@ -112,7 +112,7 @@ c_s = 1000
 rho = 2000
 
 [system]
-clamped = ["lower_bottom"]
+fixed = ["lower_bottom"]
 damping = {type = "Rayleigh.from_frequencies", f1 = 1, f2 = 10, xi1 = 0.05, xi2 = 0.05}
 loads = [{facets = "upper_top", value = [0.0, -1e3]}]
 
@@ -233,12 +233,12 @@ def test_the_channel_with_a_recorder_of_its_demo(shared_tmp: Path) -> None:
     """Keys of its mesh; a recorder that stands with the demo, its weight and static stage."""
     text = locate("channel").read_text("utf-8") + (
         '\n[[record]]\ntype = "demos.parts.problems.channel:SoilProbe"\n'
-        "points = {1_soil = [10.0, 5.0]}\n"
+        "points = {7_of_soil = [14.0, 5.0]}\n"
     )
     path = write(shared_tmp, text)
     given = ("mesh.size=1.0", "mesh.wall=1.0", "mesh.slab=1.0", "run.steps=2", "fields=")
     history = read_case(path, given, allow=("demos",)).run(COMM, progress=False).history
-    assert history["contact_resultant"][0] > 0.0 and "u_x_1_soil" in history
+    assert history["contact_resultant"][0] > 0.0 and "u_x_7_of_soil" in history
 
 
 GROUND = """
@@ -277,7 +277,7 @@ RIGID = (
     GROUND
     + """
 [system]
-clamped = "bottom"
+fixed = "bottom"
 dashpots = [{type = "FreeField", facets = "left"}, {type = "FreeField", facets = "right"}]
 
 [excitation]
@@ -397,8 +397,8 @@ MISTAKES = {
     "count": ("[8, 12]", "[8, 12, 1]", ": [mesh] divisions has 3 entries: give 2"),
     "list": ("steps = 400", "steps = [400]", ": [run] steps is a list: give a whole number"),
     "name": (
-        'clamped = "base"',
-        'clamped = "base"\nmaterial = "steel"',
+        'fixed = "base"',
+        'fixed = "base"\nmaterial = "steel"',
         ": [system] material names 'steel', which does not exist: Known: concrete",
     ),
     "function": (
@@ -464,14 +464,14 @@ def test_wrong_values_are_told_without_a_mesh(
     ("old", "new", "said"),
     [
         (
-            'clamped = "base"',
-            'clamped = "foot"',
-            "[system] clamped is 'foot', but the mesh has no group 'foot'",
+            'fixed = "base"',
+            'fixed = "foot"',
+            "[system] fixed is 'foot', but the mesh has no group 'foot'",
         ),
         (
-            'clamped = "base"',
-            'clamped = ["wall"]',
-            "[system] clamped[1] is 'wall', a cell group: give the name",
+            'fixed = "base"',
+            'fixed = ["wall"]',
+            "[system] fixed[1] is 'wall', a cell group: give the name",
         ),
         (
             "steps = 400",
@@ -492,7 +492,7 @@ divisions = [3, 3]
 
 [system]
 material = {E = 1e6, nu = 0.3, rho = 1000}
-clamped = "top"
+fixed = "top"
 
 [[contact]]
 facets = "bottom"

@@ -19,7 +19,8 @@ from vi_contact import beam, layer
 from vi_contact.core.errors import InputError
 from vi_contact.practice.cli.entry import main
 from vi_contact.practice.studies import read_case, refine, report
-from vi_contact.practice.studies.cases.description import describe, put_in_words
+from vi_contact.practice.studies.cases.description.model import describe
+from vi_contact.practice.studies.cases.description.words import put_in_words
 from vi_contact.practice.studies.cases.library import locate
 
 pytestmark = pytest.mark.serial
@@ -200,8 +201,12 @@ def test_check_describes_a_beam(tmp_path, capsys):
     out = str(tmp_path / "run")
     assert main(["run", "beam", "--check", "--out", out]) == 0
     said = capsys.readouterr().out
-    assert "tip: one point, 0.05 m before the wall; Coulomb(mu=0.3)" in said
-    assert "beam: 200 cells, 5 kg" in said and "start: clamped along x, y" in said
+    lines = [line.split() for line in said.splitlines()]
+    assert ["tip:", "gap", "at", "the", "start", "50", "mm"] in lines
+    assert ["tip:", "friction", "mu", "=", "0.3", "Coulomb"] in lines
+    assert ["beam:", "mass", "0.005", "t", "200", "cells"] in lines
+    assert ["start", "fixed", "along", "x,", "y"] in lines
+    assert ["body_force", "20", "N/m", "20", "at", "the", "start,"] in [one[:7] for one in lines]
     assert (tmp_path / "run" / "model.png").stat().st_size > 0
     model = describe(read_case(locate("beam"), SMALL), COMM)
     # of the clamped rod, c = 10 m/s: 4 l/c
@@ -211,9 +216,10 @@ def test_check_describes_a_beam(tmp_path, capsys):
 
 def test_check_describes_a_particle_and_warns_of_a_step_too_long_for_the_layer():
     model = describe(read_case(locate("layer"), ["run.dt=0.01"]), COMM)
-    said = put_in_words(model)
-    assert "1D, 1 unknown, 1 kg" in said and "particle: one point, 0.15 m before the wall" in said
-    assert "0.05 m wide, passed in b/V = 0.05 s at 1 m/s" in said
+    lines = [line.split() for line in put_in_words(model).splitlines()]
+    assert ["particle:", "mass", "0.001", "t"] in lines
+    assert ["particle:", "gap", "at", "the", "start", "150", "mm"] in lines
+    assert ["width", "of", "the", "layer", "50", "mm", "passed", "in", "0.05", "s"] in lines
     (warning,) = model["warnings"]
     assert "longer than a tenth of the time in which a body passes the layer" in warning
     assert describe(read_case(locate("layer"), ["run.dt=0.005"]), COMM)["warnings"] == []
@@ -265,7 +271,11 @@ def test_what_does_not_go_together_is_refused(name, setting):
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("[[contact]]", "[[contact]]\nheld = true", "[[contact]] has held, and [layer] is a law"),
+        (
+            "[[contact]]",
+            "[[contact]]\nroller = true",
+            "[[contact]] has roller, and [layer] is a law",
+        ),
         ("[layer]", "[gravity]\n[layer]", "[gravity] does not go with [layer], which does not"),
         (r"[[contact]]", None, "[layer] has no effect, as nothing touches without [[contact]]"),
     ],

@@ -17,6 +17,7 @@ import vi_contact
 from vi_contact.core.errors import InputError
 from vi_contact.practice.cli.entry import main
 from vi_contact.practice.studies import comparisons, read_case
+from vi_contact.practice.studies.report import remarks
 
 pytestmark = pytest.mark.serial
 LAYER = """
@@ -38,7 +39,7 @@ acceleration = 10.0
 
 [[contact]]
 facets = "left"
-held = true
+roller = true
 
 [[record]]
 type = "Resultants"
@@ -69,16 +70,24 @@ def test_checks_of_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     (tmp_path / "layer.toml").write_text(LAYER + RANKINE, encoding="utf-8")
     out = tmp_path / "out"
     read_case(tmp_path / "layer.toml").run(MPI.COMM_SELF, out=out, progress=False)
-    rest, active = comparisons(out)
+    rest, moment, active = comparisons(out)
     assert rest.expected == pytest.approx(1e4 / 3.0, rel=1e-14) and rest.ratio == pytest.approx(
         1.0, rel=1e-9
     )
+    # linear over the height, as the cells do not turn: H/3
+    assert moment.expected == pytest.approx(rest.expected / 3.0, rel=1e-14)
     assert active.found == rest.found and np.isnan(active.expected) and "steeper" in active.applies
     assert main(["post", "checks", str(out)]) == 0
     said = capsys.readouterr().out
-    assert "AtRest: expected 3333.3, found 3333.3 N/m, ratio 1\n" in said and "K0 = ν/(1-ν)" in said
+    assert "AtRest: expected 3333.3, found 3333.3 N/m, ratio 1\n" in said
+    assert "AtRest, moment: expected 1111.1, found " in said and said.count("K0 = ν/(1-ν)") == 1
+    assert "AtRest; AtRest, moment: the ratio is found over expected, and no judgement" in said
+    assert "K0 = ν/(1-ν)" in said
+    # the report says the same, once for both
+    (told,) = (sentence for sentence in remarks((rest, moment, active)) if "below 1" in sentence)
+    assert told.startswith("AtRest; AtRest, moment: the ratio is found over expected")
     assert "Rankine: does not apply: the ground is steeper" in said and "nu = 0.25 -" in said
-    assert (out / "checks.csv").read_text(encoding="utf-8").count("\n") == 3
+    assert (out / "checks.csv").read_text(encoding="utf-8").count("\n") == 4
 
 
 def test_the_old_word_of_the_wedge_is_read_with_a_warning(

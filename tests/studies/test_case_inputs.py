@@ -20,6 +20,7 @@ from vi_contact.meshes.gmsh_session import session, write
 from vi_contact.practice.cli.entry import main
 from vi_contact.practice.studies import IDA, read_case, run_ida
 from vi_contact.practice.studies.ida.runs import read_row
+from vi_contact.run.files.reading import read_run
 
 pytestmark = pytest.mark.serial
 
@@ -32,7 +33,7 @@ E = 2.0e7
 nu = 0.3
 rho = 2000.0
 [system]
-clamped = "bottom"
+fixed = "bottom"
 [[contact]]
 facets = "top"
 obstacle = {type = "HalfSpace", point = [0.0, 2.0], normal = [0.0, -1.0]}
@@ -108,9 +109,9 @@ def test_every_path_is_relative_to_the_case_file(
     [
         ("meshes/block.msh", "meshes/none.msh", "none.msh does not exist"),
         (
-            'clamped = "bottom"',
-            'clamped = "botom"',
-            "[system] clamped is 'botom', but the mesh has no group 'botom'",
+            'fixed = "bottom"',
+            'fixed = "botom"',
+            "[system] fixed is 'botom', but the mesh has no group 'botom'",
         ),
         ('facets = "top"', 'facets = "topp"', "[contact[1]] facets is 'topp'"),
         (
@@ -203,8 +204,11 @@ def test_empty_names_and_nul_are_refused(
     assert not list((tmp_path / "here").iterdir())
 
 
-def test_run_refuses_no_steps(capsys: pytest.CaptureFixture[str]) -> None:
-    assert "--steps 0: give at least one step" in said(capsys, ["run", "wall", "--steps", "0"])
+@pytest.mark.parametrize("words", [["--steps", "0"], ["--set", "run.steps=0"]])
+def test_no_steps_are_the_state_at_the_start(tmp_path: Path, words: list[str]) -> None:
+    """As simulate(steps=0): one row, however the number is given."""
+    assert main(["run", "wall", *words, "--quiet", "--out", str(tmp_path / "run")]) == 0
+    assert len(read_run(tmp_path / "run").history["t"]) == 1
 
 
 # Incremental dynamic analysis

@@ -96,7 +96,7 @@ def test_scripts_in_cases_are_refined(tmp_path: Path) -> None:
     path.write_text(
         '[mesh]\ntype = "GeoFile"\npath = "square.geo"\ntime_limit = "1000 s"\n[material.c]\nE = '
         "1\nnu = 0\nrho = 1\n"
-        "[system]\nclamped = 'base'\n[run]\ndt = 1\n",
+        "[system]\nfixed = 'base'\n[run]\ndt = 1\n",
         encoding="utf-8",
     )
     systems = [read_case(path, [f"mesh.refine={n}"]).parts(MPI.COMM_SELF).system for n in (0, 1)]

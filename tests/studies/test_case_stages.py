@@ -130,7 +130,7 @@ PROPPED = """
 [[stage]]
 name = "propped"
 type = "static"
-system = {clamped = ["lower_bottom", "upper_top"]}
+system = {fixed = ["lower_bottom", "upper_top"]}
 
 """
 
@@ -318,7 +318,7 @@ def test_many_records_share_the_static_stages(
     base = HOUSE.split('[[stage]]\nname = "aftershock"')[0]
     frame = base.replace("release = true", "").replace(
         'dashpots = [{type = "CompliantBase", facets = "lower_bottom", motion = {dt = 0.002}}]',
-        'clamped = "lower_bottom"',
+        'fixed = "lower_bottom"',
     )
     for name, text in (("base", base), ("frame", frame)):
         folder = tmp_path / name
@@ -421,15 +421,15 @@ MISTAKES = {
         ": [[stage]] 2 'shock' has another [friction] than the stage before it",
     ),
     "within": (
-        '{clamped = "lower_bottom"}',
-        "{clampt = 1}",
-        ": [[stage]] 1 'gravity': [system] has the unknown key 'clampt' for assemble: did you mean "
-        "clamped",
+        '{fixed = "lower_bottom"}',
+        "{fixt = 1}",
+        ": [[stage]] 1 'gravity': [system] has the unknown key 'fixt' for assemble: did you mean "
+        "fixed",
     ),
     "group": (
-        '{clamped = "lower_bottom"}',
-        '{clamped = "botom"}',
-        ": [[stage]] 1 'gravity': [system] clamped is 'botom', but the mesh has no group 'botom'",
+        '{fixed = "lower_bottom"}',
+        '{fixed = "botom"}',
+        ": [[stage]] 1 'gravity': [system] fixed is 'botom', but the mesh has no group 'botom'",
     ),
 }
 
@@ -448,7 +448,7 @@ def test_mistakes_are_one_sentence(tmp_path: Path, name: str) -> None:
 def test_another_friction_comes_with_a_static_stage(shared_tmp: Path) -> None:
     """As the refusal of another one in a motion says: under the new law the house slips to rest,
     and stays there."""
-    law = 'system = {clamped = "lower_bottom"}\nfriction = {type = "Coulomb", mu = 0.01}\n'
+    law = 'system = {fixed = "lower_bottom"}\nfriction = {type = "Coulomb", mu = 0.01}\n'
     text = (
         HOUSE.split('[[stage]]\nname = "shock"')[0]
         + f'[[stage]]\nname = "wet"\ntype = "static"\n{law}'
@@ -470,7 +470,7 @@ def test_what_stages_cannot_do(shared_tmp: Path) -> None:
         "run = {dt = 0.002, t_end = 0.2}", "run = {steps = 1}"
     )
     head, tail = moved.rsplit("system = {", 1)
-    held = f'{head}system = {{clamped = "lower_bottom"}}\n' + tail.split("\n", 1)[1]
+    held = f'{head}system = {{fixed = "lower_bottom"}}\n' + tail.split("\n", 1)[1]
     with pytest.raises(
         InputError, match=r"3 'aftershock': it has other supports than the dynamic stage before"
     ):

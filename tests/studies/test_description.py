@@ -19,7 +19,9 @@ import vi_contact as vc
 from vi_contact.practice.cli.entry import main
 from vi_contact.practice.plots.sketch import sketch
 from vi_contact.practice.studies import read_case
-from vi_contact.practice.studies.cases.description import _find_warnings, describe, put_in_words
+from vi_contact.practice.studies.cases.description.doubts import find_warnings
+from vi_contact.practice.studies.cases.description.model import describe
+from vi_contact.practice.studies.cases.description.words import put_in_words
 
 COMM = MPI.COMM_WORLD
 HEIGHT, CELLS, E, RHO = 4.0, 16, 1.8e9, 2000.0
@@ -33,7 +35,7 @@ upper = {lengths = [0.25, 2.0], divisions = [1, 8]}
 lower = {E = 1.8e9, nu = 0.0, rho = 2000.0}
 upper = {E = 1.8e9, nu = 0.0, rho = 2000.0}
 [system]
-clamped = "lower_bottom"
+fixed = "lower_bottom"
 prescribed = [{facets = "lower_left", components = [0]}, {facets = "lower_right", components = [0]}]
 dashpots = [{facets = "upper_top", normal = 0.1}]
 [gravity]
@@ -88,9 +90,9 @@ def test_numbers_of_two_blocks(shared_tmp: Path) -> None:
     assert free["bodies"][0]["material"] == {"type": "LinearElastic", "E": E, "nu": 0.0, "rho": RHO}
     assert {"name": "upper_left", "kind": "facets"} in free["groups"] and len(free["groups"]) == 10
     assert [(one["kind"], one["groups"], one["components"]) for one in free["supports"]] == [
-        ("clamped", ["lower_bottom"], ["x", "y"]),
-        ("held", ["lower_left"], ["x"]),
-        ("held", ["lower_right"], ["x"]),
+        ("fixed", ["lower_bottom"], ["x", "y"]),
+        ("roller, fixed", ["lower_left"], ["x"]),
+        ("roller, fixed", ["lower_right"], ["x"]),
         ("Dashpots", ["upper_top"], ["x", "y"]),
     ]
     (contact,) = free["contact"]
@@ -118,7 +120,7 @@ def test_numbers_of_two_blocks(shared_tmp: Path) -> None:
     assert gap["rigid_motions"] == 1
     assert gap["periods"][0] == pytest.approx(axial(1, HEIGHT / 2, CELLS // 2), rel=1e-8)
     across = described(
-        path, COMM, f"system.prescribed=[{held}]", "mesh.gap=0.1", "contact.1.held=true"
+        path, COMM, f"system.prescribed=[{held}]", "mesh.gap=0.1", "contact.1.roller=true"
     )
     assert (
         across["periods"] == pytest.approx(closed["periods"], rel=1e-8)
@@ -151,7 +153,7 @@ def test_any_number_of_ranks_describes_alike(shared_tmp: Path) -> None:
     whole, alone = described(path), described(path, MPI.COMM_SELF)
     assert [
         len(one["lines"]) for one in alone["outline"] if one["group"] in ("", "upper_left")
-    ] == [36, 8]
+    ] == [36, 8, 18, 18]
     read_case(path).run(COMM, out=shared_tmp / "run", progress=False)
     kept = json.loads((shared_tmp / "run" / "model.json").read_text("utf-8"))
     for model in (whole, kept) if COMM.rank == 0 else (whole,):
@@ -169,8 +171,10 @@ def test_the_command_tells_and_draws(tmp_path: Path, capsys: pytest.CaptureFixtu
     printed = capsys.readouterr().out
     assert {path.name for path in out.iterdir()} == {"model.json", "model.png"}
     model = json.loads((out / "model.json").read_text("utf-8"))
-    assert printed.startswith(put_in_words(model)) and printed.endswith("the file is in order\n")
-    assert "  upper_bottom on lower_top: 2 points on 0.25 m²; Coulomb(mu=0.5)\n" in printed
+    assert printed.startswith(put_in_words(model))
+    assert printed.endswith("the file is in order; 1 doubt about the model\n")
+    assert re.search(r"  upper_bottom on lower_top: area +0\.25  m²\n", printed)
+    assert re.search(r"  upper_bottom on lower_top: friction +mu = 0\.5 +Coulomb\n", printed)
     assert (out / "model.png").read_bytes()[:4] == b"\x89PNG"
 
 
@@ -220,7 +224,7 @@ def test_the_page_shows_what_the_command_tells(
     assert main(["run", "channel", "--check", "--quiet"]) == 0
     *told, last = capsys.readouterr().out.splitlines()
     assert told == shown.splitlines() and last.endswith(
-        "A channel buried in soil, shaken: the file is in order"
+        "A channel buried in soil, shaken: the file is in order; 1 doubt about the model"
     )
 
 
@@ -250,10 +254,11 @@ def test_a_sketch_shows_what_holds_and_touches(tmp_path: Path, d: int) -> None:
     (axis,) = sketch(model).axes
     names = [one.get_text() for one in axis.get_legend().get_texts()]
     letters = ", ".join("xyz"[:d])
-    assert names[0] == f"clamped {letters}: lower_{'left' if d == 1 else 'bottom'}" and names[
-        -1
-    ].startswith("contact")
-    assert len(model["outline"]) == {1: 2, 2: 9, 3: 2}[d]
+    bodies = ["lower: E = 1.8 GPa, 2000 kg/m³", "upper: E = 1.8 GPa, 2000 kg/m³"] if d == 2 else []
+    assert names[: len(bodies)] == bodies
+    assert names[len(bodies)] == f"fixed {letters}: lower_{'left' if d == 1 else 'bottom'}"
+    assert names[-1].startswith("contact")
+    assert len(model["outline"]) == {1: 2, 2: 11, 3: 2}[d]
     dots = axis.lines[-1]
     shown = np.array(dots.get_data_3d() if d == 3 else dots.get_xydata().T)
     assert shown[min(d - 1, 1)] == pytest.approx(2.0)
@@ -329,7 +334,7 @@ def test_motions_of_a_compliant_base_are_records(tmp_path: Path, motion: str) ->
         f'{{type = "CompliantBase", {one}' for one in (base, base.replace("_bottom", "_left"))
     )
     text = re.sub(r"\[\[excitation\]\].*?\n(?=\[run\])", "", BLOCKS, flags=re.DOTALL)
-    text = re.sub("clamped = .*\nprescribed = .*\n", "", text).replace(
+    text = re.sub("fixed = .*\nprescribed = .*\n", "", text).replace(
         "dashpots = [", f"dashpots = [{bases}"
     )
     model = described(written(tmp_path, text.replace("dt = 0.002", "dt = 0.02")))
@@ -344,6 +349,7 @@ def test_warnings_name_what_is_coarse(tmp_path: Path) -> None:
     """Edges too long for the record's energy, and steps longer than a twentieth of the first
     period."""
     soft = described(written(tmp_path, BLOCKS.replace("E = 1.8e9", "E = 1.8e4")))
+    assert "the first natural period is 30.42 s" in soft["warnings"].pop(0)
     assert [one.split()[0] for one in soft["warnings"]] == ["'lower'", "'upper'"]
     assert (
         np.sqrt(0.5 * 1.8e4 / RHO) / 2.0 == pytest.approx(1.06, rel=1e-2)
@@ -364,7 +370,7 @@ offset = [6.4]
 lower = {E = 5e7, nu = 0.3, rho = 1900.0}
 upper = {E = 3e10, nu = 0.2, rho = 2500.0}
 [system]
-clamped = ["lower_bottom", "lower_left"]
+fixed = ["lower_bottom", "lower_left"]
 [gravity]
 cells = "upper"
 [[contact]]
@@ -393,7 +399,7 @@ def test_contact_nodes_are_counted_and_placed(shared_tmp: Path) -> None:
         "(3.07692, 6) and 4 more places; 1 node partly covered (carried by their neighbours), at "
         "(15.3846, 6)"
     )
-    assert f"  base: {contact['nodes']}" in put_in_words(model)
+    assert f"  {contact['nodes']}\n" in put_in_words(model)
     assert {kind: len(places) for kind, places in contact["others"].items()} == {
         "in front of nothing": 7,
         "partly covered": 1,
@@ -450,7 +456,7 @@ def test_steps_are_compared_with_periods_of_open_contact(shared_tmp: Path) -> No
         model["run"]["dt"] = dt * model["periods_open"][0] / 20.0
         said = [
             one
-            for one in _find_warnings(model)
+            for one in find_warnings(model)
             if "first natural period with the contact open" in one
         ]
         assert len(said) == count

@@ -265,6 +265,15 @@ def test_parts_levels_and_runs_that_die(study: Path) -> None:
         again(study, part=(2, 3), launch=("no-such-program",), **asked)
 
 
+def test_a_record_that_is_stretched_is_told_and_levels_are_round(study: Path) -> None:
+    """A record of a fifth of the level is multiplied by five; the table has the level itself."""
+    peak = pga(tapered(read_record("motion_1.at2"), fraction=0.05))
+    asked = {"motions": ("motion_1.at2",), "scales": (), "levels": (3.0 * peak, 5.0 * peak)}
+    rows, said = again(study.parent / "stretched", launch=("false",), intensity="pga", **asked)
+    assert said[0].startswith("records are multiplied by more than 4: motion_1 by up to 5; ")
+    assert [row["pga"] for row in rows] == [float(f"{k * peak:.12g}") for k in (3.0, 5.0)]
+
+
 def test_stopping_stops_the_runs(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Ctrl-C between two rows: processes that go on are stopped, also where SIGINT is ignored, and
     leave no row."""

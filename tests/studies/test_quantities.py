@@ -49,6 +49,8 @@ VALUES = {
     ("40 MPa*s", "Pa*s"): 4e7,
     ("2 kPa·s", "Pa*s"): 2e3,
     ("2*9.81", "m/s2"): 19.62,
+    ("50*9.81 kN/m2", "Pa"): 490500.0,
+    ("(1 + 1e-1)/2 mm", "m"): 0.00055,
     ("100 kPa/mm", "Pa/m"): 1e8,
     ("12 rad/s", "rad/s"): 12.0,
     ("1e-2 m2/s3", "m2/s3"): 0.01,
@@ -70,6 +72,7 @@ WRONG = {
     ("٣ m", "m"): "'٣' in it does not belong to arithmetic",
     ("2400 kg/m3", "Pa"): "'kg/m3' is not a unit of it: give it in Pa",
     ("30 MPa", "1"): "give it in % or as a plain",
+    ("2*x kN/m2", "Pa"): "'kN' in it has no sign before it: give one, or leave it out if",
     ("5 %", "Pa"): "'%' is not a unit of it",
     ("12 Hz", "rad/s"): "'Hz' is not a unit of it: give it in rad/s",
     ("1.8 g/cm3", "kg/m3"): "'g/cm3' is not a unit of it: give it in kg",
@@ -151,7 +154,7 @@ nu = 0.3
 rho = "1.8 t/m3"
 
 [system]
-clamped = "bottom"
+fixed = "bottom"
 initial_velocity = ["0.1*y", "0"]
 
 [[system.loads]]

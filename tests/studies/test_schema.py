@@ -120,7 +120,7 @@ def test_the_schema_takes_the_cases_that_run_and_no_others(
         "material.concrete.E=",
         "material.concrete.nu=0.5",
         "material.concrete.rho=-1",
-        "system.clamped=3",
+        "system.fixed=3",
         "run.steps=[1]",
         "solver.type=Condenst",
         "contct.facets=face",

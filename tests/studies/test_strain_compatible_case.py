@@ -40,7 +40,7 @@ E = 2e9
 nu = 0.2
 rho = 2000.0
 [system]
-clamped = "lower_bottom"
+fixed = "lower_bottom"
 tied = [{first = "lower_left", second = "lower_right"}]
 damping = {type = "DampingRatio", frequency = 6.0, second = 20.0}
 [strain_compatible]

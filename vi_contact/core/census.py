@@ -16,7 +16,7 @@ NAMED = 3  # places of a kind that are named
 # kind -> what that means for the conditions
 MEANINGS = {
     "shared by both sides": "joined there",
-    "clamped": "left out",
+    "fixed": "left out",
     "prescribed": "left out",
     "tied to another": "one condition with it",
     "not listed": "left out",
@@ -37,7 +37,7 @@ class Census:
             faces.
         places: kind of node -> coordinates (k, d) [m] of all nodes of this kind, on all ranks
             alike, ordered by node number. A kind says in a few words what became of the node, as in
-            "shared by both sides", "clamped", "prescribed", "in front of nothing", "partly
+            "shared by both sides", "fixed", "prescribed", "in front of nothing", "partly
             covered".
     """
 

@@ -143,8 +143,12 @@ def write_output(path: str | os.PathLike[str], data: bytes) -> None:
         OSError: names the file.
     """
     if is_stream(Path(path)):
-        with open(path, "ab", buffering=0) as file:
-            write_all(file, data)
+        try:
+            with open(path, "ab", buffering=0) as file:
+                write_all(file, data)
+        except OSError as error:  # of writing: it names no file
+            error.filename = error.filename or os.fspath(path)
+            raise
     else:
         write_atomically(Path(path), data, safe=False)
 

@@ -14,6 +14,10 @@ from .quantities import Unit
 RIGHT_ANGLE = 1e-9  # its cosine, to round-off
 BESIDE = 0.01  # cosine of the angle (89.4°) from which on a direction is along a boundary
 SAME_TURN = 1e-9  # relative; turns of normals that differ by less are one
+PRESS_FIT = (
+    "make a press fit of bodies that touch without stress, by quasi_static on "
+    "surface.moving(towards=…) or by fem.InitialStrain"
+)
 OVERLAP = 1e-12  # of the size of the body: gaps below zero that are round-off
 REMEDY = (
     "give unit vectors from the body to the obstacle (the normal of a HalfSpace points towards the "
@@ -278,6 +282,7 @@ def check_gap(gap: Array, points: Array, size: float) -> Array:
         place = describe_point(points[worst])
         raise InputError(
             f"the body penetrates its obstacle by {-gap[worst]:.3g} m at {place} "
-            "before the first step: move the obstacle or the mesh so that every initial gap is >= 0"
+            "before the first step: move the obstacle or the mesh so that every initial gap is >= "
+            f"0, or {PRESS_FIT}"
         )
     return np.maximum(gap, 0.0)

@@ -23,6 +23,12 @@ NAMES: dict[str, dict[str, str]] = {
     },
 }
 
+# Table of a case file -> old key -> new key.
+KEYS: dict[str, dict[str, str]] = {
+    "system": {"clamped": "fixed"},
+    "contact": {"held": "roller"},
+}
+
 # Old word of a case file or an option -> new word.
 WORDS: dict[str, str] = {
     "Coulomb": "CoulombWedge",  # of [[check]]: the friction law keeps the name

@@ -8,6 +8,7 @@ import numpy as np
 from .algebra import max_abs
 from .checks import instance, number, quote, refuse, whole
 from .errors import InputError
+from .obstacles import PRESS_FIT
 from .problem import ContactProblem
 from .step import State
 
@@ -96,9 +97,8 @@ def initial_state(problem: ContactProblem, t: float = 0.0) -> State:
     overlap, *sizes = surface.comm.max(np.array([overlap, max_abs(system.u0), gap0]))
     if overlap > OVERLAP * max(sizes):
         raise InputError(
-            f"the initial displacement penetrates the obstacle by {overlap:.3g} m: reduce it or "
-            "enlarge the gap; a press fit begins in touch, and quasi_static closes it on a surface "
-            "that moves, surface.moving(towards=…)"
+            f"the initial displacement penetrates the obstacle by {overlap:.3g} m: reduce it, "
+            f"enlarge the gap, or {PRESS_FIT}"
         )
     none = np.zeros(surface.count)
     return State(t, 0, system.u0.copy(), system.v0.copy(), none, surface.bilateral.copy())

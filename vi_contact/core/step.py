@@ -62,6 +62,7 @@ class State:
         memory: what a scheme carries besides u and v: vectors (n,), and arrays that are the same on
             every rank. The class of the scheme says under which names; nobody else reads it.
         r_t: tangential reactions (m, d - 1) [N] of that step, None without friction.
+        certificate: of the equilibrium that the state is; None of states that steps have led to.
     """
 
     t: float
@@ -72,6 +73,7 @@ class State:
     active: Mask
     memory: Mapping[str, Array] = field(default_factory=dict)
     r_t: Array | None = None
+    certificate: float | None = None
 
     def __repr__(self) -> str:
         """Return time, step and sizes on this rank: not the arrays."""

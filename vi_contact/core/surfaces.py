@@ -235,7 +235,16 @@ class ContactSurface:
         It says where they are and how large; its places in the unknowns stay those of this rank,
         so it is no surface to solve with.
         """
-        names = ("points", "normals", "weights", "gap0", "bilateral", "compliance", "nodes")
+        names = (
+            "points",
+            "normals",
+            "weights",
+            "gap0",
+            "bilateral",
+            "compliance",
+            "nodes",
+            "uncovered",
+        )
         known = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
         arrays = {name: self.everywhere(values) for name, values in known.items()}
         return replace(self, comm=SerialComm(), slots=np.arange(self.total), **arrays)

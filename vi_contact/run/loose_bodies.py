@@ -108,10 +108,12 @@ def judge_loose_bodies(problem: ContactProblem) -> Iterator[tuple[str, bool]]:
             "no contact touches it"
         )
         if body.coinciding:
+            nodes = "one of its nodes lies"
+            if body.coinciding > 1:
+                nodes = f"{body.coinciding} of its nodes lie"
             yield (
-                f"{sentence}: {body.coinciding} of its nodes lie at the places of nodes of another "
-                "body, as of meshes that are not merged: merge them (Coherence in Gmsh), or make a "
-                "contact or a tie between the two",
+                f"{sentence}: {nodes} where another body has one, as of meshes that are not "
+                "merged: merge them (Coherence in Gmsh), or make a contact or a tie between both",
                 True,
             )
         else:

@@ -112,7 +112,8 @@ def choose_method(
         method.bind()
         problem.equations.forget_loads()
         scheme.check(problem)
-        method.solvers[0].check(problem)
+        for solver in method.solvers:
+            solver.check(problem)
         if state is not None:
             check_state(owner, problem, state, dt=size, tolerance=tolerance, scheme=scheme)
 

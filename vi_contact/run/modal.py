@@ -36,9 +36,7 @@ def lowest_frequency(
     """
     system.refuse_statics_only("lowest_frequency")
     if system.floating:
-        raise InputError(
-            "the body is not held, so its lowest frequency is zero: clamp a part of it"
-        )
+        raise InputError("the body is not held, so its lowest frequency is zero: fix a part of it")
     dot = system.algebra.dot
     factor = system.algebra.factor(system.K)
     directions = 1.0 + 0.1 * np.arange(system.influence.shape[1])

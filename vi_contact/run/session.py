@@ -177,6 +177,8 @@ class Session:
         facts = self._facts(status, self.stopped, time.perf_counter() - begin) | {
             "seconds_per_linear_step": linear
         }
+        if facts["steps"] == 0:
+            facts |= self._describe_state()
         warning = energy_warning(facts)
         if warning and self.root:
             log.warning("%s", warning)
@@ -412,6 +414,21 @@ class Session:
             "seconds_per_step": seconds_per_step,
             "seconds_per_linear_step": float("nan"),
         }
+
+    def _describe_state(self) -> dict[str, Any]:
+        """Return what there is to tell of a run without steps: its one state. Collective."""
+        state = self.place.state
+        surface = self.method.problem.surface
+        gap = surface.gap(state.t) - surface.normal_values(state.u)
+        opened = gap[~state.active & np.isfinite(gap)]
+        closed = surface.comm.sum(np.array([np.count_nonzero(state.active)]))
+        facts: dict[str, Any] = {
+            "closed_points": int(closed[0]),
+            "largest_opening": largest(surface.comm, np.max(opened, initial=0.0)),
+        }
+        if state.certificate is not None:
+            facts["worst_certificate"] = state.certificate
+        return facts
 
     def _seconds_per_linear_step(self) -> float:
         """Return the median time [s] of a linear step from the last state.

@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
+from inspect import Parameter, signature
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -45,7 +46,7 @@ from .solution import Solution
 from .time_steps import TimeSteps, plan_steps
 from .wall_time import WallTime
 
-__all__ = ["Solution", "simulate"]
+__all__ = ["Solution", "rehearse", "simulate"]
 
 
 def simulate(
@@ -144,6 +145,23 @@ def simulate(
     )
     with open_run(request) as (session, writer):
         return session.go(writer)
+
+
+def rehearse(**arguments: Any) -> None:
+    """Do all that ``simulate`` does before its first step, and end there. Collective.
+
+    The folder of the run is made, locked and left as it was.
+
+    Args:
+        arguments: those of ``simulate``.
+
+    Raises:
+        InputError: whatever ``simulate`` refuses before its first step.
+    """
+    parameters = signature(simulate).parameters.values()
+    defaults = {one.name: one.default for one in parameters if one.default is not Parameter.empty}
+    with open_run(RunRequest(**(defaults | arguments))):
+        pass  # all that can be refused has been looked at
 
 
 @contextmanager

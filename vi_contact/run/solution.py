@@ -56,12 +56,24 @@ RUN = (
     Line("halved steps", "{halved_steps}", "halved_steps"),
     Line(
         "steps in contact",
-        "{steps_in_contact}, largest uplift {largest_uplift:.3f}",
+        "{steps_in_contact}, largest open share {largest_uplift:.3f}",
         "steps_in_contact",
     ),
     Line("smallest gap", "{smallest_gap:.3e} m", "steps_in_contact"),
     Line("friction used, T/(mu N)", "{used}", "used"),
     Line("closed points that slip", "{slid}", "slid"),
+)
+# The summary of a run without steps.
+STATE = (
+    Line("", "state at t = {t_end:g} s, without a step, on {ranks} rank{s}"),
+    Line("solver", "{solver}"),
+    Line("unknowns, contact points", "{unknowns}, {contact_points}"),
+    Line("closed points", "{closed_points} of {contact_points}", "closed_points"),
+    Line("largest opening", "{largest_opening:.3e} m", "closed_points"),
+    Line("certificate", "{worst_certificate:.2e}", "certified"),
+    Line("friction used, T/(mu N)", "{used}", "used"),
+    Line("strain energy", "{energy[energy_strain]:.6e} J", "energy"),
+    Line("reason", "{reason}", "reason"),
 )
 ENERGY = (
     Line("", "  energy ledger [J]", "energy"),
@@ -194,6 +206,8 @@ def energy_warning(facts: Mapping[str, Any]) -> str | None:
 def _list_entries(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return (name, value) of every line of the summary; those without a name are whole lines."""
     words = _put_in_words(facts)
+    if facts["steps"] == 0:
+        return _fill_in(STATE, words)
     entries = _fill_in(RUN, words)
     for method, difference in (facts["cross_check"] or {}).items():
         values = ", ".join(f"{name} {value:.2e}" for name, value in difference.items())
@@ -239,6 +253,7 @@ def _put_in_words(facts: Mapping[str, Any]) -> dict[str, Any]:
         "and_output": ", output and the cross-check" if facts["cross_check"] else " and output",
         "halved_steps": facts["halved_steps"] or None,
         "reason": facts["reason"] or None,
+        "certified": facts["worst_certificate"] or None,  # a state that nobody solved for has none
         "used": _put_share_in_words(facts.get("friction_used")),
         "slid": _put_share_in_words(facts.get("slipping")),
     }

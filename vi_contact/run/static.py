@@ -21,6 +21,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.algebra import EffectiveMatrix, largest, max_abs
+from ..core.certificate import Certificate
 from ..core.checks import describe_point, number, quote, real
 from ..core.collective import Parts, agree, together
 from ..core.errors import InputError
@@ -133,16 +134,27 @@ class Equilibria:
         self._K = EffectiveMatrix(
             system.K, system.algebra, space=system.space, inertia=(0.0, system.M)
         )
-        self._solve: Callable[[StepProblem], StepResult]
+        self._solve: Callable[[StepProblem], tuple[StepResult, Certificate]]
         self._curved: NonlinearSolver | None = None
         refuse_matrix(problem, self._K)
         if system.internal is not None:
             self._curved = self._prepare_nonlinear(solver, tolerance)
         elif system.floating:
-            self._solve = Proximal(problem, self._K, solver, tolerance).solve
+            proximal = Proximal(problem, self._K, solver, tolerance)
+
+            def approach(step: StepProblem) -> tuple[StepResult, Certificate]:
+                result = proximal.solve(step)
+                return result, proximal.certificate(result)
+
+            self._solve = approach
         else:
             certified = CertifiedSolver(problem, self._K, 1.0, [solver], tolerance, advice=ADVICE)
-            self._solve = lambda step: certified.solve(step).result
+
+            def solve_once(step: StepProblem) -> tuple[StepResult, Certificate]:
+                answer = certified.solve(step)
+                return answer.result, answer.certificate
+
+            self._solve = solve_once
 
     def _prepare_nonlinear(self, solver: Solver, tolerance: float) -> NonlinearSolver:
         """Return what solves stages of a body whose internal force is not linear.
@@ -214,9 +226,18 @@ class Equilibria:
                 slip0=problem.slip_origin(old.u, old.t, t),
             )
             refuse_nan(step, lambda: problem.static_load)
-            result = self._solve(step)
+            result, certificate = self._solve(step)
         rest = np.zeros_like(old.u)
-        return State(t, old.k, result.x, rest, result.r_n, result.active, r_t=result.r_t)
+        return State(
+            t,
+            old.k,
+            result.x,
+            rest,
+            result.r_n,
+            result.active,
+            r_t=result.r_t,
+            certificate=certificate.worst,
+        )
 
     def _solve_nonlinear(self, solver: NonlinearSolver, old: State, t: float) -> State:
         """Return the equilibrium of a body that is not linear at a time.
@@ -230,7 +251,16 @@ class Equilibria:
         step, certified = solver.solve(stage)
         answer = complete(stage, step, certified.result, certified.image)
         rest = np.zeros_like(old.u)
-        return State(t, old.k, answer.x, rest, answer.r_n, answer.active, r_t=answer.r_t)
+        return State(
+            t,
+            old.k,
+            answer.x,
+            rest,
+            answer.r_n,
+            answer.active,
+            r_t=answer.r_t,
+            certificate=certified.certificate.worst,
+        )
 
 
 def quasi_static(

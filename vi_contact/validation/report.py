@@ -5,7 +5,8 @@ from pathlib import Path
 
 from ..core.version import __version__
 from ..practice.plots.pages import write_pages
-from ..practice.plots.sections import Section, Table, format_number
+from ..practice.plots.sections import Section, Table
+from ..practice.units.report_units import write_number
 from .entry import KINDS, Entry
 from .results import write_results
 from .runner import FAIL, SKIP, Outcome, count_within, group_by_reason
@@ -66,8 +67,8 @@ def _sum_up(outcomes: Sequence[Outcome]) -> Section:
                 f"{within} of {judged}",
                 f"{outcome.seconds:.1f}",
                 "-" if found is None else str(found.unknowns),
-                "-" if found is None else format_number(found.certificate),
-                "-" if found is None else format_number(found.defect),
+                "-" if found is None else write_number(found.certificate),
+                "-" if found is None else write_number(found.defect),
             )
         )
     header = (

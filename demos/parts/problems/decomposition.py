@@ -50,9 +50,10 @@ def split(problem: ContactProblem, report: Report) -> Decomposition | None:
     step, result, surface = report.step, report.result, problem.surface
     space: Any = problem.system.space
     n = len(step.b)
+    origin = np.zeros(n) if step.origin is None else step.origin
     parts = [
-        result.x,
-        step.A.factor.solve(step.b),
+        origin + result.x,
+        origin + step.A.factor.solve(step.b),
         -step.A.factor.solve(surface.reaction_load(result.r_n, n)),
     ]
     defect = surface.comm.max(

@@ -52,7 +52,7 @@ from .elimination import Elimination
 from .forms import ElasticForms, Materials, cell_materials
 from .initial_strains import InitialStrain, InitialStrains
 from .linear_forms import AnyLoad, LinearForm, Loads
-from .loads import Prescribed, evaluate
+from .loads import BodyForce, Prescribed, Traction, evaluate
 from .own_forms import Forms, OwnForms
 from .space import FemSpace, translations
 from .ties import Tied
@@ -393,9 +393,6 @@ def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...]) ->
 def _make_force(space: FemSpace, section: Section, load: AnyLoad) -> Callable[[float], Array]:
     """Return t [s] -> (n,) [N], the load on the free unknowns, less its history. Collective.
 
-    Of tractions and body forces it is Pᵀ ∫ interpolated value · v, one product with a matrix that
-    is assembled here; linear forms and initial strains assemble vectors of their own.
-
     Args:
         space: the body's unknowns.
         section: its thickness.
@@ -403,9 +400,25 @@ def _make_force(space: FemSpace, section: Section, load: AnyLoad) -> Callable[[f
     """
     if isinstance(load, InitialStrain):
         return lambda t: space.forms.initial.forces(t, only=load)
+    full = make_nodal_force(space, section, load)
+    return lambda t: space.pull(full(t))
+
+
+def make_nodal_force(
+    space: FemSpace, section: Section, load: Traction | BodyForce | LinearForm
+) -> Callable[[float], Array]:
+    """Return t [s] -> (owned full,) [N], the load on all nodes, less its history. Collective.
+
+    Of tractions and body forces it is ∫ interpolated value · v, one product with a matrix that is
+    assembled here; linear forms assemble vectors of their own.
+
+    Args:
+        space: the body's unknowns.
+        section: its thickness.
+        load: what acts.
+    """
     if isinstance(load, LinearForm):
-        full = load.full(space, section.thickness)
-        return lambda t: space.pull(full(t))
+        return load.full(space, section.thickness)
     # ∫ g·v of nodal values g of the load: at each time only these are evaluated anew
     g = ufl.TrialFunction(space.V)
     v = ufl.TestFunction(space.V)
@@ -415,7 +428,7 @@ def _make_force(space: FemSpace, section: Section, load: AnyLoad) -> Callable[[f
 
     def force(t: float) -> Array:
         values = evaluate(name, load.value, space.points, t, space.comm)
-        return space.pull(section.thickness * (matrix @ values.ravel()))
+        return np.asarray(section.thickness * (matrix @ values.ravel()))
 
     return force
 

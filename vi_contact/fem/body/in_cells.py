@@ -15,7 +15,20 @@ INSIDE = 1e-9  # a share of a cell that is round-off: a point so far outside is 
 BULGE = 0.1  # of its size: how far a curved side may leave the box of a cell's nodes
 
 
-def find_in_cells(space: Any, points: Array) -> list[tuple[Indices, Array] | None]:
+def find_nodes_of_cells(space: Any, cells: Indices) -> Indices:
+    """Return the numbers of the nodes of cells, the same on all ranks. Collective.
+
+    Args:
+        space: a ``FemSpace``.
+        cells: local numbers of this rank's, ghosts' too.
+    """
+    own = space.node_of_block[compat.cell_blocks(space.V)[cells]].ravel()
+    return np.unique(np.concatenate(from_each(space.comm, own)))
+
+
+def find_in_cells(
+    space: Any, points: Array, among: Indices | None = None
+) -> list[tuple[Indices, Array] | None]:
     """Return for each point the numbers (n,) of the nodes of its cell, and their weights (n,).
 
     Where cells share the point, on a side, the one with the lowest number counts: every number of
@@ -24,6 +37,7 @@ def find_in_cells(space: Any, points: Array) -> list[tuple[Indices, Array] | Non
     Args:
         space: a ``FemSpace``.
         points: (p, d) [m].
+        among: local numbers of the cells that count; None: all.
 
     Returns:
         A pair for each point, None for one that is outside of all cells.
@@ -32,6 +46,9 @@ def find_in_cells(space: Any, points: Array) -> list[tuple[Indices, Array] | Non
     nodes = compat.cell_blocks(space.V)
     numbers = compat.cell_numbers(mesh)
     low, high = _compute_boxes(mesh, len(numbers))
+    counts = np.ones(len(numbers), dtype=bool)
+    if among is not None:
+        counts = np.isin(np.arange(len(numbers)), among)
     judge = _Weights(compat.lagrange(mesh, 1))
     weigh = judge if space.degree == 1 else _Weights(space.V)
 
@@ -40,7 +57,7 @@ def find_in_cells(space: Any, points: Array) -> list[tuple[Indices, Array] | Non
     rows = [np.zeros((0, 2 + 2 * width))]
     for k, point in enumerate(points):
         place = np.append(point, np.zeros(3 - len(point)))
-        near = np.all((low <= point) & (point <= high), axis=1)
+        near = counts & np.all((low <= point) & (point <= high), axis=1)
         for cell in np.flatnonzero(near):
             # vertex functions of the first degree are negative outside of a cell alone
             if np.min(judge(place, cell)) >= -INSIDE:

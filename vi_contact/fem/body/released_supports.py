@@ -92,7 +92,7 @@ def _spaces(static: ContactProblem, problem: ContactProblem) -> tuple[FemSpace, 
     if largest(before.comm, not np.array_equal(static.surface.points, problem.surface.points)):
         raise InputError(
             "the static stage and the problem have different contact points, perhaps because "
-            "clamped nodes are left out: name the same points for both (points=)"
+            "fixed nodes are left out: name the same points for both (points=)"
         )
     return before, after
 

@@ -32,7 +32,7 @@ from ..mesh.numbering import NodeTable, facet_rows, node_numbers
 from ..mesh.tagged_mesh import Cells, Facets
 from .elimination import Elimination
 from .hierarchical import Hierarchy, needs_hierarchy
-from .in_cells import find_in_cells
+from .in_cells import find_in_cells, find_nodes_of_cells
 from .loads import Support
 from .ties import PLACE_TOLERANCE, UNTIED, Links, Tied, link
 
@@ -319,13 +319,20 @@ class FemSpace(NodalSpace):
         rows = self.at_nodes(numbers // self.dimension, values.astype(float))
         return rows[np.arange(len(numbers)), numbers % self.dimension]
 
-    def find_in_cells(self, points: Array) -> list[tuple[Indices, Array] | None]:
+    def find_in_cells(
+        self, points: Array, among: Indices | None = None
+    ) -> list[tuple[Indices, Array] | None]:
         """Return the nodes of the cell of each point and their weights (``in_cells``). Collective.
 
         Args:
             points: (p, d) [m]; the answer is None for one that is outside of all cells.
+            among: local numbers of the cells that count; None: all.
         """
-        return find_in_cells(self, points)
+        return find_in_cells(self, points, among)
+
+    def find_nodes_of_cells(self, cells: Indices) -> Indices:
+        """Return the numbers of the nodes of local cells, the same on all ranks. Collective."""
+        return find_nodes_of_cells(self, cells)
 
     def leaders(self, nodes: Indices) -> Indices:
         """Return the numbers of the nodes that these follow in all components.

@@ -112,8 +112,8 @@ def refuse_hinges(owner: str, names: Sequence[str], points: Array) -> None:
         shared = shared.replace(" 1 nodes", " a node")
     raise InputError(
         f"{owner}: {shared}, {where}, where bodies would hang together although they may part "
-        "beside: give each body corner points of its own there, or say hinges=True (in a case file "
-        "hinges = true in this [[contact]]) where a hinge is meant"
+        "beside: give each body corner points of its own there, or say hinges=True where a "
+        "hinge is meant"
     )
 
 

@@ -286,7 +286,7 @@ def _refuse_several(side1: Side, side2: Side, row: int) -> None:
     d = side1.nodes.points.shape[1]
     if d == 1:
         raise InputError(f"{where}, and can touch one only: list the end of one bar on side 2")
-    mortar = 'matching=DualMortar(), in a case file matching = {type = "DualMortar"}'
+    mortar = "matching=DualMortar()"
     if max(side1.facets.shape[1], side2.facets.shape[1]) > (2 if d == 2 else 4):
         mortar = f"degree=1 and {mortar}"
     raise InputError(

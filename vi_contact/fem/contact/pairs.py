@@ -27,6 +27,7 @@ from ...core.checks import describe_point, flag, optional, provides
 from ...core.collective import together
 from ...core.corners import FEATURE_ANGLE
 from ...core.errors import InputError
+from ...core.obstacles import PRESS_FIT
 from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem
 from ...core.timing import report_time
@@ -308,7 +309,7 @@ def _sort_nodes(
     # nodes that are held in every component have no condition
     free = _find_unclamped(space, side1.name, nodes, side2, matched)
     kinds = _sort_kinds(side1, shared, opposite, nodes.numbers[~free])
-    kinds |= _sort_held_anywhere(space, side1, kinds["clamped"])
+    kinds |= _sort_held_anywhere(space, side1, kinds["fixed"])
     watched: tuple[Watched, ...] = ()
     if watch:
         watched = _watch_held(space, side1, side2, nodes.pick(~free), matched.pick(~free))
@@ -338,7 +339,7 @@ def _sort_kinds(side1: Side, shared: Mask, opposite: Indices, clamped: Indices) 
     numbers = side1.nodes.numbers
     return {
         "shared by both sides": shared,
-        "clamped": np.isin(numbers, clamped),
+        "fixed": np.isin(numbers, clamped),
         "in front of nothing": ~(shared | np.isin(numbers, opposite)),
     }
 
@@ -380,7 +381,7 @@ def _sort_held_anywhere(space: FemSpace, side1: Side, clamped: Mask) -> dict[str
     # a rank knows of its own nodes only whether something moves them
     own = sort_held(space, side1.nodes, clamped)
     moved = space.comm.max(own["prescribed"].astype(float)) > 0.0
-    return {"clamped": clamped & ~moved, "prescribed": clamped & moved}
+    return {"fixed": clamped & ~moved, "prescribed": clamped & moved}
 
 
 def _watch_held(
@@ -647,17 +648,17 @@ def _find_unclamped(
     lost = np.flatnonzero(clamped & ~side2.nodes.held[facing].all(axis=1))
     if len(lost):
         raise InputError(
-            f"contact node {describe_point(nodes.points[lost[0]])} of '{name}' is clamped but "
+            f"contact node {describe_point(nodes.points[lost[0]])} of '{name}' is fixed but "
             f"faces a free "
-            f"node of '{side2.name}': make '{side2.name}' the first side, or clamp less"
+            f"node of '{side2.name}': make '{side2.name}' the first side, or fix less"
         )
     if clamped.all():
         raise InputError(
-            f"no contact nodes: every node of '{name}' that faces '{side2.name}' is clamped, on "
-            "both sides or tied to the other side; clamp or tie less"
+            f"no contact nodes: every node of '{name}' that faces '{side2.name}' is fixed, on "
+            "both sides or tied to the other side; fix or tie less"
         )
     if clamped.any() and space.comm.rank == 0:
-        log.info("%d clamped nodes of '%s' are left out of the contact", clamped.sum(), name)
+        log.info("%d fixed nodes of '%s' are left out of the contact", clamped.sum(), name)
     return np.asarray(~clamped)
 
 
@@ -687,9 +688,7 @@ def _measure_gap(
             f"'{side2.name}' lies {-gap[worst]:.3g} m behind '{name}' at "
             f"{describe_point(nodes.points[worst])}"
             ": the bodies overlap there, or these are not the boundaries between them; choose the "
-            "sides that face, or draw the bodies in touch and make a press fit by "
-            "fem.InitialStrain, the strain of the body that is too large, or by quasi_static on "
-            "surface.moving(towards=…), its overlap"
+            f"sides that face, or {PRESS_FIT}"
         )
     if gap.min() < -1e-12 * space.size and space.comm.rank == 0:
         log.warning(

@@ -490,11 +490,11 @@ def free_nodes(space: FemSpace, nodes: Nodes, name: str) -> Nodes:
     count = round(total(space.comm, clamped.sum()))
     if not largest(space.comm, (~clamped).any()):
         raise InputError(
-            f"no contact nodes: every node of boundary group '{name}' is also clamped, and a point "
-            "cannot be clamped and in contact: choose another boundary or clamp less"
+            f"no contact nodes: every node of boundary group '{name}' is also fixed, and a point "
+            "cannot be fixed and in contact: choose another boundary or fix less"
         )
     if count:
-        log.info("%d clamped nodes of '%s' are left out of the contact surface", count, name)
+        log.info("%d fixed nodes of '%s' are left out of the contact surface", count, name)
     return nodes.pick(~clamped)
 
 
@@ -522,7 +522,7 @@ def find_listed(
         if distance[row] > 0.05 * space.size:
             raise InputError(
                 f"contact point {describe_point(x)} is {distance[row]:.3g} m away from boundary "
-                f"group '{name}': give a point on it"
+                f"group '{name}': give a point on it, or leave points= out for the whole boundary"
             )
         if distance[row] > 1e-6 * space.size and space.comm.rank == 0:
             log.warning(
@@ -532,12 +532,13 @@ def find_listed(
             )
         if nodes.held[row].all():
             raise InputError(
-                f"contact point {describe_point(x)} is also clamped: leave it out, or clamp less"
+                f"contact point {describe_point(x)} is also fixed: leave it out, or fix less"
             )
         if row in rows:
             raise InputError(
                 f"contact point {describe_point(x)} is listed twice (nearest node "
-                f"{nodes.numbers[row]}): list each once"
+                f"{nodes.numbers[row]}): list each once, or leave points= out "
+                "for the whole boundary"
             )
         rows.append(row)
     if not rows:

@@ -165,7 +165,7 @@ def sort_held(space: Any, nodes: Nodes, mask: Mask) -> Mapping[str, Mask]:
         mask: (k,) which of them are held in every component.
 
     Returns:
-        "prescribed" -> (k,) mask of those of this rank that some condition moves, "clamped" -> the
+        "prescribed" -> (k,) mask of those of this rank that some condition moves, "fixed" -> the
         others in ``mask``.
     """
     moved = np.zeros(len(space.nodes), dtype=bool)
@@ -176,4 +176,4 @@ def sort_held(space: Any, nodes: Nodes, mask: Mask) -> Mapping[str, Mask]:
     here = np.flatnonzero(mask & (blocks >= 0))  # a rank may have no nodes
     driven = np.zeros(len(blocks), dtype=bool)
     driven[here] = moved[blocks[here]]
-    return {"clamped": mask & ~driven, "prescribed": driven}
+    return {"fixed": mask & ~driven, "prescribed": driven}

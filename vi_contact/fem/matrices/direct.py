@@ -106,7 +106,7 @@ def failure(pc: Any, mat: Any, error: Any = None) -> InputError:
     if code in ZERO_PIVOT or no_diagonal or reason == "singular":
         return InputError(
             "the effective matrix cannot be factorised: it is singular or contains NaN: check the "
-            "materials, and that every part of the body is clamped or has mass"
+            "materials, and that every part of the body is fixed or has mass"
         )
     cause = reason if error is None else f"error {code}, {message}"
     return InputError(

@@ -119,12 +119,15 @@ class NodalSpace:
         numbers, _ = self.find_nearest(points)
         return numbers
 
-    def find_nearest(self, points: Array, *, anywhere: bool = False) -> tuple[Indices, Array]:
+    def find_nearest(
+        self, points: Array, *, anywhere: bool = False, among: Indices | None = None
+    ) -> tuple[Indices, Array]:
         """Find the nodes as ``find_nodes`` does, and how far they are. Collective.
 
         Args:
             points: (k, d) [m].
             anywhere: whether points far from all nodes are let be.
+            among: numbers of the nodes that count, the same on all ranks; None: all.
 
         Returns:
             (k,) numbers of nodes and (k,) distances [m], the same on all ranks.
@@ -134,12 +137,16 @@ class NodalSpace:
         """
         numbers = np.empty(len(points), dtype=np.int64)
         distances = np.zeros(len(points))
+        left_out = np.zeros(len(self.nodes), dtype=bool)
+        if among is not None:
+            left_out = ~np.isin(self.nodes, among)
         for i, point in enumerate(np.atleast_2d(np.asarray(points, dtype=float))):
             if point.shape != (self.dimension,):
                 raise InputError(
                     f"point {tuple(point)} has {len(point)} coordinates: give {self.dimension}"
                 )
             distance = np.linalg.norm(self.points - point, axis=1)
+            distance[left_out] = np.inf
             nearest = -largest(self.comm, -np.min(distance, initial=np.inf))
             if nearest > MEANT * self.size and not anywhere:
                 raise InputError(

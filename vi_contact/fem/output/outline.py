@@ -56,8 +56,8 @@ def outline(
 ) -> list[dict[str, Any]]:
     """Return the lines that draw a body, the same on any number of ranks. Collective.
 
-    In the plane these are the facets of the boundary and of its groups; in space and on a line the
-    edges of a box round each region.
+    In the plane these are the facets of the boundary and of its groups, and the borders of each
+    region; in space and on a line the edges of a box round each region.
 
     Args:
         space: the body's unknowns.
@@ -66,10 +66,12 @@ def outline(
 
     Returns:
         on rank 0 a group with the lines [x0, y0, x1, y1] [m] (in space six numbers, on a line two)
-        for each: "" for the boundary and for boxes, else the name of the group.
+        for each: "" for the boundary, borders and boxes, else the name of the group. Borders and
+        boxes have the number of their region too.
     """
     if space.dimension != 2:
-        return [_draw_box(space, cells) for cells in regions]
+        boxes = [_draw_box(space, cells) for cells in regions]
+        return [_describe_region(number, lines) for number, lines in enumerate(boxes)]
     mesh = space.mesh
     boundary = Facets.where("", mesh, lambda x: np.ones(x.shape[1], dtype=bool))
     groups = [boundary, *(group for group in tags.values() if isinstance(group, Facets))]
@@ -84,10 +86,41 @@ def outline(
             lines.append([*first, *second])
         parts = mesh.comm.gather(lines) or []
         drawn.append({"group": group.name, "lines": sorted(sum(parts, []))})
+    for number, cells in enumerate(regions):
+        drawn.append(_describe_region(number, _draw_border(mesh, cells)))
     return drawn
 
 
-def _draw_box(space: FemSpace, cells: Indices) -> dict[str, Any]:
+def _describe_region(number: int, lines: list[list[float]]) -> dict[str, Any]:
+    """Return the lines round the region of this number, as ``outline`` does."""
+    return {"group": "", "region": number, "lines": lines}
+
+
+def _draw_border(mesh: Any, cells: Indices) -> list[list[float]]:
+    """Return the lines around local cells of all ranks in the plane, on rank 0. Collective.
+
+    A facet between two of the cells is theirs twice, one on the border once.
+    """
+    owned = cells[cells < mesh.topology.index_map(2).size_local]
+    mesh.topology.create_connectivity(2, 1)
+    facets_of = mesh.topology.connectivity(2, 1)
+    own = [facets_of.links(cell) for cell in owned]
+    facets = np.concatenate(own) if own else np.zeros(0, dtype=np.int32)
+    ends = mesh.geometry.x[compat.entities_to_geometry(mesh, 1, facets)][..., :2]
+
+    # The end of least coordinates first, so that both cells tell the same of a facet.
+    x = ends[..., 0]
+    y = ends[..., 1]
+    turned = (x[:, 0] > x[:, 1]) | ((x[:, 0] == x[:, 1]) & (y[:, 0] > y[:, 1]))
+    ends[turned] = ends[turned, ::-1]
+    parts = mesh.comm.gather(ends.reshape(-1, 4))
+    if parts is None:
+        return []
+    lines, counts = np.unique(np.concatenate(parts), axis=0, return_counts=True)
+    return list(lines[counts == 1].tolist())
+
+
+def _draw_box(space: FemSpace, cells: Indices) -> list[list[float]]:
     """Return the edges of the box round local cells of all ranks, as ``outline`` does. Collective.
 
     Corner i of the box has the upper end of axis c where bit c of i is set, and an edge goes from a
@@ -106,4 +139,4 @@ def _draw_box(space: FemSpace, cells: Indices) -> dict[str, Any]:
         for c in range(d):
             if not i >> c & 1:
                 lines.append([*corners[i], *corners[i | 1 << c]])
-    return {"group": "", "lines": lines}
+    return lines

@@ -18,6 +18,7 @@ from ...core.errors import ViContactError
 from ...core.step import State
 from ...run.simulate_many import Ended, simulate_many
 from ..studies.cases.case import Case, read_case
+from ..studies.cases.sentences import write_for_case_files
 from ..studies.cases.stages import run_leading_stages
 from ..studies.cases.vocabulary import Parts
 from .entry import status_of
@@ -107,7 +108,7 @@ def main() -> None:
 
     for number, ended in make_runs(json.loads(sys.argv[1]), world(), tell):
         failed = isinstance(ended, ViContactError)
-        sentence = f"vi-contact: {ended}" if failed else ""
+        sentence = f"vi-contact: {write_for_case_files(str(ended))}" if failed else ""
         _print({"ended": number, "status": int(failed), "said": sentence})
 
 

@@ -199,8 +199,6 @@ def _run(options: argparse.Namespace) -> str:
     timing.show_on_terminal(not options.quiet)
     if options.wall_time is not None:
         parse_wall_time(options.wall_time)
-    if options.steps is not None and options.steps < 1:
-        raise InputError(f"--steps {options.steps}: give at least one step")
     case = _read_case(options, path)
     out = options.out or case.out or Path("results") / path.stem
     if options.check:
@@ -251,18 +249,19 @@ def _check_model(case: "Case", comm: Any, folder: Path) -> str:
     """
     from ...core.files import on_root
     from ...core.own_files import inner_folder
+    from ...fem.mesh.communicators import MpiComm
     from ...run.files.folder import is_marked, run_folder
     from ..plots.histories import write_picture  # late: matplotlib
     from ..plots.sketch import sketch
-    from ..studies.cases.description import describe, put_in_words, write_model
+    from ..studies.cases.description.model import write_model
+    from ..studies.cases.description.words import count_doubts, put_in_words
+    from ..studies.cases.examination import examine
 
     case.check()
-    parts = case.parts(comm)
-    model = describe(case, comm, parts)
-    ranks = parts.system.algebra.comm
-    case.columns(comm, parts)  # points and groups of the recorders
+    on_root(MpiComm(comm), lambda: case.refuse_files_of_others(folder))
     if is_marked(folder):  # of a run, of which model.json there tells
         folder = inner_folder(folder, "check")
+    model, ranks = examine(case, comm, folder)
     write_model(ranks, model, run_folder(ranks, folder))
     picture = folder / "model.png"
     on_root(ranks, lambda: write_picture(sketch(model), picture, bbox_inches="tight"))
@@ -270,4 +269,6 @@ def _check_model(case: "Case", comm: Any, folder: Path) -> str:
         say(f"{put_in_words(model)}\npicture: {picture}")
     if model["defects"]:
         raise InputError(f"{case.path}: {'; '.join(model['defects'])}")
-    return f"{case.path}: {model['title']}: the file is in order" if comm.rank == 0 else ""
+    if comm.rank != 0:
+        return ""
+    return f"{case.path}: {model['title']}: the file is in order; {count_doubts(model)}"

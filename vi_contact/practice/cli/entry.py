@@ -2,6 +2,7 @@
 
 import argparse
 import logging
+import signal
 import sys
 import traceback
 from collections.abc import Callable, Sequence
@@ -9,13 +10,23 @@ from collections.abc import Callable, Sequence
 from ...core.errors import Interrupted, OutOfTime, ViContactError
 from ...core.version import __version__
 from .case import add_case_commands
-from .errors import Parser, check_words, explain_errors, fail_together, keep_streams, say, world
+from .errors import (
+    Parser,
+    check_words,
+    explain_errors,
+    fail_together,
+    is_of_pipe,
+    keep_streams,
+    say,
+    world,
+)
 from .ida import add_ida_commands
 
 _DESCRIPTION = """vi-contact computes structures that may lift off, bounce and slide. It checks
 every time step. Start it with "mpirun -n N vi-contact" on N ranks. Options that begin with
 -vi_contact_volume_ go to PETSc, for example -vi_contact_volume_snes_monitor."""
 _PETSC = "-vi_contact_"
+PIPE_STATUS = 128 + signal.SIGPIPE  # as shells have it where nobody reads what is written
 
 
 def build_parser(command: str = "") -> argparse.ArgumentParser:
@@ -91,7 +102,9 @@ def status_of(call: Callable[[], object]) -> int:
     keep_streams()
     try:
         explain_errors(call, {})
-    except ViContactError as error:
+    except (BrokenPipeError, ViContactError) as error:
+        if is_of_pipe(error):
+            return PIPE_STATUS
         fail_together(str(error))
         return _print_error(error, 1)
     except KeyboardInterrupt as error:

@@ -19,6 +19,7 @@ from ...core.files import describe_os_error
 
 PATIENCE = 30.0  # seconds between the first rank that has failed and the last
 LIBRARIES = ("dolfinx", "ufl", "basix", "petsc4py", "mpi4py", "h5py", "gmsh", "matplotlib", "tqdm")
+STREAMS = ("/dev/stdout", "/dev/fd/1", "/proc/self/fd/1")  # names of standard output
 OUTPUTS = ("--out", "--csv", "--png")
 CONTROLS = re.compile("[\\x00-\\x08\\x0b-\\x1f\\x7f-\\x9f]")  # characters that steer a terminal
 OUT_OF_MEMORY = (
@@ -49,6 +50,13 @@ def check_words(arguments: Sequence[str]) -> None:
 class Parser(argparse.ArgumentParser):
     """Parse as argparse does, with sentences that stay short where a word is long."""
 
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse as argparse does; an unknown option is told under the usage of its command."""
+        options, unknown = self.parse_known_args(args, namespace)
+        if unknown:
+            getattr(options, "parser", self).error(f"unknown option: {' '.join(unknown)}")
+        return options
+
     def error(self, message: str) -> NoReturn:
         """Print usage and message, and end the program."""
         words = " ".join(word[:SHOWN] for word in message.split())
@@ -71,10 +79,14 @@ def explain_errors(call: Callable[[], Any], spelling: Mapping[str, str]) -> Any:
     except ViContactError as error:
         if is_of_memory(error):
             raise ViContactError(OUT_OF_MEMORY) from error
+        if is_of_pipe(error):
+            raise
         if spelling and isinstance(error, InputError):
             raise InputError(_spell_options(str(error), spelling)) from error
         raise
     except Exception as error:
+        if is_of_pipe(error):
+            raise
         text = _explain(error)
         if text is None:
             raise
@@ -86,8 +98,22 @@ def _spell_options(text: str, spelling: Mapping[str, str]) -> str:
     for argument, option in spelling.items():
         # with a blank after it first, or two blanks would be left
         text = text.replace(f" {argument}= ", f" {option} ")
+        # as sentences of case files have it
+        text = text.replace(f" {argument} = … ", f" {option} ")
         text = text.replace(f" {argument}=", f" {option} ")
     return text.rstrip()
+
+
+def is_of_pipe(error: BaseException | None) -> bool:
+    """Tell whether standard output was the file to write, and nobody reads it any more.
+
+    This is no fault: ``motion convert FILE /dev/stdout | head -1`` has what it wants.
+    """
+    while error is not None:
+        if isinstance(error, BrokenPipeError) and error.filename in STREAMS:
+            return True
+        error = error.__cause__
+    return False
 
 
 def escape_unprintable(text: str) -> str:

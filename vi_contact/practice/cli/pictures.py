@@ -1,13 +1,14 @@
 """``vi-contact report``, ``plot`` and ``film``: options and what the commands do."""
 
 import argparse
+import time
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...core.checks import quote
 from ...core.errors import InputError
-from .errors import world
+from .errors import say, world
 from .options import add_command, add_folder, output_file
 
 if TYPE_CHECKING:
@@ -55,6 +56,14 @@ def _add_report(commands: Any) -> None:
         ),
     )
     report.add_argument(
+        "--halved",
+        action="store_true",
+        help=(
+            "run the case again with half the time step, into DIR/refined/dt, and say how far "
+            "the numbers that decide change"
+        ),
+    )
+    report.add_argument(
         "--refine",
         action="store_true",
         help=(
@@ -67,7 +76,7 @@ def _add_report(commands: Any) -> None:
         action="append",
         default=[],
         metavar="PACKAGE",
-        help="the option of 'vi-contact run', for the runs of --refine",
+        help="the option of 'vi-contact run', for the runs of --halved and --refine",
     )
     add_folder(report)
 
@@ -90,7 +99,7 @@ def _add_plot(commands: Any) -> None:
         metavar="T[,T...]",
         help=(
             "moments to draw [s] (default: the first, the last, and the one of the "
-            "largest uplift, contact pressure or displacement)"
+            "largest open share, contact pressure or displacement)"
         ),
     )
     plot.add_argument(
@@ -118,7 +127,7 @@ def _add_film(commands: Any) -> None:
         dest="times",
         help=(
             "first and last moment of the film [s] (default: 48 frames around the moment "
-            "of the largest uplift, contact pressure or displacement)"
+            "of the largest open share, contact pressure or displacement)"
         ),
     )
     film.add_argument(
@@ -130,7 +139,7 @@ def _add_film(commands: Any) -> None:
         "--column",
         metavar="COLUMN",
         help=(
-            "column of history.csv that is drawn below the bodies (default: the uplift, "
+            "column of history.csv that is drawn below the bodies (default: the open share, "
             "the contact pressure or the first displacement that changes)"
         ),
     )
@@ -159,33 +168,47 @@ def _report(options: argparse.Namespace) -> str:
         import mpi4py.MPI  # noqa: F401  # first: ``world`` finds it
 
     from ..plots.web_page import MISSING, can_write
-    from ..studies.refinement import refine
-    from ..studies.report import report
+    from ..studies.refinement import estimate_cost, refine, write_seconds
+    from ..studies.report import write_report
 
     comm = world()
     if options.out is not None:
         output_file(options.out)
-    failed = refine(options.folder, comm, allow=options.allow) if options.refine else None
+    halved = ["dt"] if options.halved else []
+    if options.refine:
+        halved = ["h", "dt"]
+    failed = None
+    if halved:
+        cost = estimate_cost(options.folder, halved)
+        if comm.rank == 0:
+            say(cost)
+        failed = refine(options.folder, comm, names=halved, allow=options.allow)
     if comm.rank != 0:
         return ""
+    begin = time.perf_counter()
     columns = None if options.show is None else [group.split(",") for group in options.show]
-    refinement, paths = report(
+    written = write_report(
         options.folder, out=options.out, title=options.title, columns=columns, failed=failed
     )
-    lines = _format_refinement(refinement) if options.refine else []
-    lines += map(str, paths)
+    lines = _format_tables(written.first) if halved else []
+    lines += _format_tables(written.error) if options.refine else []
+    lines += map(str, written.paths)
+    lines.append(f"report written in {write_seconds(time.perf_counter() - begin)}")
     if options.out is None and not can_write():
         lines.append(f"no report.html: {MISSING}")
     return "\n".join(lines)
 
 
-def _format_refinement(section: "Section") -> list[str]:
-    """Return the lines about the discretisation error: sentences, and tables in columns."""
+def _format_tables(section: "Section") -> list[str]:
+    """Return the lines of a section: sentences, tables in columns, and notes."""
     lines = [*section.sentences]
     for table in section.tables:
-        for first, *others in (table.header, *table.rows):
-            lines.append(f"{first:<48}" + "".join(f"{cell:>13}" for cell in others))
-    return lines
+        rows = [table.header, *table.rows]
+        widths = [2 + max(map(len, column)) for column in zip(*rows, strict=True)]
+        for row in rows:
+            cells = [cell.ljust(width) for cell, width in zip(row, widths, strict=True)]
+            lines.append("".join(cells).rstrip())
+    return [*lines, *section.notes]
 
 
 def _plot(options: argparse.Namespace) -> str:

@@ -1,13 +1,13 @@
-"""``vi-contact post peaks|spectrum|transfer|loop|checks``: options and what each does."""
+"""``vi-contact post peaks|spectrum|transfer|loop|checks|profile``: options and what each does."""
 
 import argparse
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...core.errors import InputError
 from ...core.files import write_csv
-from ...run.files.folder import FILES
 from ..engineering import (
     floor_spectrum,
     hysteresis,
@@ -17,7 +17,9 @@ from ..engineering import (
     write_peaks,
 )
 from ..plots.records import plot_loop, plot_spectra, plot_transfer
-from .options import PICTURES, add_actions, add_command, add_folder, output_file, space_numbers
+from .options import add_actions, add_command, add_folder, space_numbers
+from .profile import add_profile
+from .tables import add_table, choose_table
 
 if TYPE_CHECKING:
     from ...run.files.reading import RunFolder
@@ -35,6 +37,9 @@ CHECKS_HEADER = (
     "unit",
     "ratio",
     "applies",
+    "lasted_s",
+    "reading",
+    "notes",
 )
 
 
@@ -47,6 +52,7 @@ def add_post_commands(commands: Any) -> None:
     _add_spectrum(actions)
     _add_transfer(actions)
     _add_checks(actions)
+    add_profile(actions)
     _add_loop(actions)
 
 
@@ -59,7 +65,7 @@ def _add_peaks(actions: Any) -> None:
         help="print the largest and the smallest value of every column, as a table",
     )
     add_folder(largest)
-    _add_table(largest, "peaks")
+    add_table(largest, "peaks")
     largest.add_argument(
         "columns", metavar="COLUMN", nargs="*", help="columns of history.csv (default: all)"
     )
@@ -76,7 +82,7 @@ def _add_spectrum(actions: Any) -> None:
         ),
     )
     add_folder(spectrum)
-    _add_table(spectrum, "spectrum")
+    add_table(spectrum, "spectrum")
     spectrum.add_argument(
         "columns",
         metavar="COLUMN",
@@ -116,7 +122,7 @@ def _add_transfer(actions: Any) -> None:
         ),
     )
     add_folder(transfer)
-    _add_table(transfer, "transfer")
+    add_table(transfer, "transfer")
     transfer.add_argument(
         "surface", metavar="COLUMN", help="acceleration of the upper point, such as a_x_top"
     )
@@ -155,7 +161,7 @@ def _add_checks(actions: Any) -> None:
         help="compare the run with the formulas of its [[check]] tables",
     )
     add_folder(checks)
-    _add_table(checks, "checks")
+    add_table(checks, "checks")
 
 
 def _add_loop(actions: Any) -> None:
@@ -170,21 +176,12 @@ def _add_loop(actions: Any) -> None:
         ),
     )
     add_folder(loop)
-    _add_table(loop, "loop")
+    add_table(loop, "loop")
     loop.add_argument(
         "deformation", metavar="DEFORMATION", help="column such as u_x_top or theta_base"
     )
     loop.add_argument("force", metavar="FORCE", help="column such as reaction_x_base or M_base")
     loop.add_argument("--turn", action="store_true", help="change the sign of the force")
-
-
-def _add_table(parser: argparse.ArgumentParser, action: str) -> None:
-    """Add the option of the file of the table; ``action`` names it otherwise."""
-    parser.add_argument(
-        "--out",
-        metavar="CSV",
-        help=f"file of the table (default: DIR/{action}.csv); the picture is written beside it",
-    )
 
 
 def _read_folder(options: argparse.Namespace) -> "RunFolder":
@@ -198,7 +195,7 @@ def _tabulate_peaks(options: argparse.Namespace) -> str:
     """Carry out ``post peaks``: write the table, and return it for people."""
     run = _read_folder(options)
     rows = peaks(run.history, run.columns, options.columns or None)
-    table = write_peaks(_choose_table(options), rows)
+    table = write_peaks(choose_table(options), rows)
     lines = [f"{'column':<28}{'unit':>6}{'max':>13}{'t [s]':>10}{'min':>13}{'t [s]':>10}"]
     for row in rows:
         lines.append(
@@ -213,7 +210,7 @@ def _compute_spectra(options: argparse.Namespace) -> str:
     """Carry out ``post spectrum``: write table and picture, and return their paths."""
     run = _read_folder(options)
     periods = space_numbers("--periods", options.periods)
-    table = _choose_table(options)
+    table = choose_table(options)
     spectra = {}
     steps = {}
     for column in options.columns:
@@ -248,7 +245,7 @@ def _write_spectra(path: Path, spectra: Mapping[str, "ResponseSpectrum"], dampin
 def _compute_transfer(options: argparse.Namespace) -> str:
     """Carry out ``post transfer``: write table and picture, and return the peak."""
     run = _read_folder(options)
-    table = _choose_table(options)
+    table = choose_table(options)
     frequencies = None
     if options.frequencies is not None:
         frequencies = space_numbers("--frequencies", options.frequencies)
@@ -272,7 +269,7 @@ def _compute_transfer(options: argparse.Namespace) -> str:
 def _draw_loop(options: argparse.Namespace) -> str:
     """Carry out ``post loop``: write table and picture, and return the work."""
     run = _read_folder(options)
-    table = _choose_table(options)
+    table = choose_table(options)
     sign = -1.0 if options.turn else 1.0
     loop = hysteresis(run.history, options.deformation, options.force, sign=sign)
     write_csv(
@@ -297,44 +294,67 @@ def _compare_with_formulas(options: argparse.Namespace) -> str:
     from ..studies.report import comparisons
 
     results = comparisons(options.folder)
-    table = _choose_table(options)
+    table = choose_table(options)
     if not results:
         raise InputError(
             f"{options.folder}: its case has no [[check]]: add one, docs/guide/checks.md lists them"
         )
-    rows = []
-    lines = []
+    write_csv(table, CHECKS_HEADER, [_make_row(result) for result in results])
+
+    # A check that compares a thrust and its moment says its formula once.
+    lines: list[str] = []
+    before = ""
     for result in results:
-        inputs = _list_inputs(result)
-        rows.append(
-            [
-                result.name,
-                result.formula,
-                result.source,
-                result.range,
-                inputs,
-                result.expected,
-                result.found,
-                result.unit,
-                result.ratio,
-                result.applies,
-            ]
+        lines.append(f"{result.name}: {_describe_outcome(result)}")
+        about = (
+            f"    {result.formula}   ({result.source})\n"
+            f"    for {result.range}\n"
+            f"    {_list_inputs(result)}"
         )
-        if result.applies:
-            outcome = f"does not apply: {result.applies}"
-        else:
-            outcome = (
-                f"expected {result.expected:.5g}, found {result.found:.5g} {result.unit}, "
-                f"ratio {result.ratio:.4g}"
-            )
-        lines += [
-            f"{result.name}: {outcome}",
-            f"    {result.formula}   ({result.source})",
-            f"    for {result.range}",
-            f"    {inputs}",
-        ]
-    write_csv(table, CHECKS_HEADER, rows)
+        if about != before:
+            lines.append(about)
+        before = about
+        lines += [f"    note: {note}" for note in result.notes]
+
+    # What the ratios mean, once for all checks of which it is the same.
+    names: dict[str, list[str]] = {}
+    for result in results:
+        if result.reading and not result.applies:
+            names.setdefault(result.reading, []).append(result.name)
+    lines += [f"{'; '.join(owners)}: {reading}" for reading, owners in names.items()]
     return "\n".join([*lines, f"table: {table}"])
+
+
+def _make_row(result: "Comparison") -> list[Any]:
+    """Return the row of a comparison in the table of checks."""
+    return [
+        result.name,
+        result.formula,
+        result.source,
+        result.range,
+        _list_inputs(result),
+        result.expected,
+        result.found,
+        result.unit,
+        result.ratio,
+        result.applies,
+        result.lasted,
+        result.reading,
+        "; ".join(result.notes),
+    ]
+
+
+def _describe_outcome(result: "Comparison") -> str:
+    """Return both numbers and their ratio, or why they are not compared."""
+    if result.applies:
+        return f"does not apply: {result.applies}"
+    outcome = (
+        f"expected {result.expected:.5g}, found {result.found:.5g} {result.unit}, "
+        f"ratio {result.ratio:.4g}"
+    )
+    if math.isfinite(result.lasted):
+        outcome += f", above 90 % of it for {result.lasted:.3g} s"
+    return outcome
 
 
 def _list_inputs(result: "Comparison") -> str:
@@ -342,22 +362,3 @@ def _list_inputs(result: "Comparison") -> str:
     return "; ".join(
         f"{name} = {value:.6g} {unit}" for name, (value, unit) in result.inputs.items()
     )
-
-
-def _choose_table(options: argparse.Namespace) -> Path:
-    """Return the table that a command is about to write.
-
-    A picture of the same name is written beside it. It raises InputError where a file may not be
-    written.
-    """
-    folder = Path(options.folder)
-    out = output_file(
-        options.out or folder / f"{options.action}.csv", reads=[folder / name for name in FILES]
-    )
-    if out.suffix.lower() in PICTURES:
-        raise InputError(
-            f"{out}: the table would be overwritten by its picture; give a name such as "
-            f"{out.stem}.csv"
-        )
-    output_file(out.with_suffix(PICTURES[0]))
-    return out

@@ -43,7 +43,7 @@ def peaks(
     """Return the largest and smallest values of columns; nan values are left out.
 
     The peak of an acceleration is that of the time step where contact closes, and is marked so: it
-    grows as dt falls, while displacements and forces converge.
+    grows as dt falls.
 
     Args:
         history: column -> values (rows,) of a run.

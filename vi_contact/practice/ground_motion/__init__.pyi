@@ -2,6 +2,7 @@ from .chain import Processing as Processing
 from .chain import scaled_to_arias as scaled_to_arias
 from .chain import scaled_to_pga as scaled_to_pga
 from .chain import scaled_to_psa as scaled_to_psa
+from .design_spectrum import TabulatedSpectrum as TabulatedSpectrum
 from .ec8 import EC8Spectrum as EC8Spectrum
 from .excitation import GroundMotion as GroundMotion
 from .formats.reader import read_record as read_record

@@ -92,6 +92,11 @@ class EC8Spectrum:
         return cls(ratio * ag, 1.0, tb, tc, td, damping=damping, plateau=3.0)
 
     @property
+    def name(self) -> str:
+        """Return how a report calls it."""
+        return f"Eurocode 8, ag = {self.ag:g} m/s², S = {self.s:g}"
+
+    @property
     def eta(self) -> float:
         """Return the damping correction sqrt(10 / (5 + xi in %)), not below 0.55 (eq. 3.6)."""
         return max(math.sqrt(10.0 / (5.0 + 100.0 * self.damping)), 0.55)

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.algebra import Array, Indices
+from ...core.algebra import Array, Indices, Mask
 from ...core.arguments import check_arguments
 from ...core.checks import number, optional
 from ...core.errors import InputError
@@ -48,8 +48,26 @@ FILM_FRAMES = 48  # at most: a film of two megabytes
 BODIES = ("0.35", "tab:blue", "tab:green", "tab:purple")  # edges of their elements
 # Direction from which the light comes; sides along it have 0.6 of their brightness.
 LIGHT = np.array([0.3, -0.5, 0.81])
-# How far inside the dots are that show the contact in the plane, over the size of the bodies.
-INWARDS = 0.015
+# How far inside the dots are that show the contact in the plane, over the size of what is shown.
+INWARDS = 0.008
+DOT = 11.0  # area of a dot [square points]: larger ones hide a stem
+# A picture shows the structure with as much around it, over its size along the same axis, and at
+# least so much over its largest size; and the whole model where that is not larger than by this.
+AROUND = 0.5
+LEAST_AROUND = 0.15
+WHOLE_MARGIN = 0.03  # around a whole model, over its largest size
+WORTH = 0.6
+# Edges of elements [points], and how many on a line across the picture are still seen apart.
+EDGE = 0.2
+FINE = 60
+OUTLINE = 0.8  # of a body in the plane [points]
+# Of a picture in the plane [inches]: width of a panel, bounds of its height, what is beside it.
+PANEL = 2.7
+NUMBERS = 0.45  # on the left of a panel
+HEIGHTS = (1.3, 4.6)
+BESIDE = 1.5
+TOGETHER = "\u00a0"  # a blank at which no line breaks
+SMALL = {"font.size": 8, "xtick.labelsize": 7, "ytick.labelsize": 7}
 
 
 @dataclass(frozen=True)
@@ -71,6 +89,8 @@ class Scene:
         nodes: (m,) row of ``points`` of each condition.
         pressure: (k, m) contact pressures [Pa], (k, 0) without contact.
         states: (k, m) as of ``contact_states``.
+        structure: (p,) which polygons are of bodies that are no ground; all where none is.
+        outlines: (o, 2) rows of ``points`` of the borders of bodies in the plane; none in space.
     """
 
     times: Array
@@ -85,6 +105,8 @@ class Scene:
     nodes: Indices
     pressure: Array
     states: Array
+    structure: Mask
+    outlines: Indices
 
     @classmethod
     def read(cls, run: RunFolder, times: Sequence[float], magnified: float | None) -> "Scene":
@@ -113,11 +135,15 @@ class Scene:
         t = frames.t[np.unique(find_nearest(frames.t, times))]
 
         # The polygons: cells of the plane, or what is seen of a body in space from outside.
-        if frames.points.shape[1] == 2:
+        flat = frames.points.shape[1] == 2
+        boundary, cells = frames.boundary
+        if flat:
             corners = frames.cells
             cells = np.arange(len(frames.cells))
+            outlines = boundary
         else:
-            corners, cells = frames.boundary
+            corners = boundary
+            outlines = boundary[:0, :2]
 
         contact = run.contact if "pressure" in history else None
         if contact is None:
@@ -143,6 +169,8 @@ class Scene:
             pressure = history["pressure"][rows]
             states = contact_states(history)[rows]
 
+        up = 1 if flat else "xyz".index(_find_up(contact))
+        structure = frames.find_structure(up)[cells]
         size = float(np.ptp(frames.points[drawn], axis=0).max())
         largest = float(np.linalg.norm(u_of_times, axis=2).max())
         return cls(
@@ -158,13 +186,59 @@ class Scene:
             nodes=np.searchsorted(drawn, nodes),
             pressure=pressure,
             states=states,
+            structure=structure if structure.any() else ~structure,
+            outlines=np.searchsorted(drawn, outlines),
         )
 
     @property
     def up(self) -> str:
         """Return the axis that points upwards: y where contact is along y rather than z, else z."""
-        along = np.zeros(1) if self.contact is None else np.abs(self.contact.normals.sum(axis=0))
-        return "y" if along[1 % len(along)] > along[-1] else "z"
+        return _find_up(self.contact)
+
+    @cached_property
+    def reached(self) -> tuple[Array, Array]:
+        """Return the least and the largest coordinates (d,) that are drawn at all times [m]."""
+        return self._find_limits(np.unique(self.polygons))
+
+    @cached_property
+    def window(self) -> tuple[Array, Array]:
+        """Return the least and the largest coordinates (d,) of the pictures [m].
+
+        They are the structure's with a margin of its size, and the whole model's where this is not
+        much more. They hold for all times, so that pictures can be compared.
+        """
+        low, high = self.reached
+        room = WHOLE_MARGIN * float((high - low).max())
+        low = low - room
+        high = high + room
+        nodes = np.unique(self.polygons[self.structure])
+        size = np.ptp(self.points[nodes], axis=0)
+        around = np.maximum(AROUND * size, LEAST_AROUND * float(size.max()))
+        first, last = self._find_limits(nodes)
+        first = np.maximum(first - around, low)
+        last = np.minimum(last + around, high)
+        if np.prod(last - first) > WORTH * np.prod(high - low):
+            return low, high
+        return first, last
+
+    @property
+    def zoomed(self) -> bool:
+        """Return whether the pictures show less than the whole model."""
+        low, high = self.reached
+        first, last = self.window
+        return bool(np.any(first > low) or np.any(last < high))
+
+    @cached_property
+    def seen(self) -> Mask:
+        """Return which polygons (p,) have their middle in the window before they move."""
+        low, high = self.window
+        middles = self.points[self.polygons].mean(axis=1)
+        return np.asarray(np.all((middles >= low) & (middles <= high), axis=1))
+
+    def _find_limits(self, nodes: Indices) -> tuple[Array, Array]:
+        """Return the least and the largest coordinates (d,) that nodes reach [m]."""
+        places = self.points[nodes] + self.magnified * self.u[:, nodes]
+        return places.min(axis=(0, 1)), places.max(axis=(0, 1))
 
     def displace(self, k: int) -> Array:
         """Return where the nodes are drawn at the time number k, (s, d) [m]."""
@@ -172,11 +246,11 @@ class Scene:
 
     @cached_property
     def stresses(self) -> Painter:
-        """Return the colours of the stresses; the largest per cent has one colour."""
+        """Return the colours of the stresses that are seen; the largest per cent has one colour."""
         from matplotlib import colormaps
         from matplotlib.colors import Normalize
 
-        most = float(np.nan_to_num(np.percentile(self.stress, 99.0))) or 1.0
+        most = float(np.nan_to_num(np.percentile(self.stress[:, self.seen], 99.0))) or 1.0
         factor, unit = scale(most, "Pa")
         return Painter(
             Normalize(0.0, factor * most), colormaps["YlGnBu"], f"von Mises stress [{unit}]", factor
@@ -190,8 +264,9 @@ class Scene:
     def draw(self, axis: Any, k: int, states: bool = False) -> None:
         """Draw the bodies at one time.
 
-        Each has edges of a colour of its own. In the plane, dots inside of them show the contact,
-        those of both sides of a corner apart.
+        Elements have thin edges, where they are not too many to be seen; in the plane bodies have
+        outlines, in space the edges of each have a colour of its own. In the plane, dots inside of
+        bodies show the contact, those of both sides of a corner apart.
 
         Args:
             axis: in projection where the bodies are in space.
@@ -200,33 +275,55 @@ class Scene:
                 of the contact pressure on bodies coloured by their stress.
         """
         places = self.displace(k)
-        polygons = places[self.polygons]
         flat = places.shape[1] == 2
-        colours = self.stresses.map_colours(self.stress[k])
+        # An axis in projection does not cut what is beyond its limits.
+        shown = np.ones(len(self.polygons), dtype=bool) if flat else self.seen
+        polygons = places[self.polygons[shown]]
+        colours = self.stresses.map_colours(self.stress[k, shown])
         if states:
             colours = np.full_like(colours, 0.95)
         if not flat:
             # Sides along the light are darker, or the shape of a body could not be seen.
             colours[:, :3] *= 0.6 + 0.4 * np.abs(compute_normals(polygons) @ LIGHT)[:, None]
-        edges = [BODIES[body % len(BODIES)] for body in self.body]
-        thin = min(0.3, 600.0 / len(polygons))  # or fine meshes show nothing but their edges
-        add_polygons(axis, polygons, facecolors=colours, edgecolors=edges, linewidths=thin)
-
-        # The limits are those of all times, so that pictures can be compared.
-        reached = (self.points + self.magnified * self.u).reshape(-1, places.shape[1])
-        low = reached.min(axis=0)
-        high = reached.max(axis=0)
-        set_limits(axis, low, high, margin=0.03, up=self.up)
+        edges: Any = [BODIES[body % len(BODIES)] for body in self.body[shown]]
+        if flat:
+            edges = "0.45"
+        if states or np.sqrt(np.count_nonzero(self.seen)) > FINE:
+            edges = "face"  # a fine mesh shows nothing but its edges
+        add_polygons(axis, polygons, facecolors=colours, edgecolors=edges, linewidths=EDGE)
+        if flat:
+            look = {"facecolors": "none", "edgecolors": "0.1", "linewidths": OUTLINE, "zorder": 3}
+            add_polygons(axis, places[self.outlines], **look)
+        set_limits(axis, *self.window, up=self.up)
 
         if flat and self.contact is not None:
-            inwards = INWARDS * float(np.ptp(self.points, axis=0).max()) * self.contact.normals
+            low, high = self.window
+            inwards = INWARDS * float((high - low).max()) * self.contact.normals
             if states:
                 painter = Painter.of_states()
                 values = self.states[k]
             else:
                 painter = self.pressures
                 values = self.pressure[k]
-            painter.draw_dots(axis, places[self.nodes] - inwards, values)
+            painter.draw_dots(axis, places[self.nodes] - inwards, values, DOT)
+
+    def draw_whole(self, axis: Any) -> None:
+        """Draw the outlines of all bodies in the plane as they were, and what the window shows."""
+        from matplotlib.patches import Rectangle
+
+        look = {"facecolors": "none", "edgecolors": "0.3", "linewidths": 0.5}
+        add_polygons(axis, self.points[self.outlines], **look)
+        low, high = self.window
+        axis.add_patch(Rectangle(low, *(high - low), fill=False, edgecolor="black", lw=1.2))
+        set_limits(axis, *self.reached, margin=WHOLE_MARGIN)
+        axis.set_axis_off()
+        axis.set_title("what is shown", fontsize=7)
+
+
+def _find_up(contact: ContactGeometry | None) -> str:
+    """Return the axis that points upwards: y where contact is along y rather than z, else z."""
+    along = np.zeros(1) if contact is None else np.abs(contact.normals.sum(axis=0))
+    return "y" if along[1 % len(along)] > along[-1] else "z"
 
 
 def _round_down(factor: float) -> float:
@@ -267,25 +364,65 @@ def plot_deformed(
         InputError: the run has no fields, or is in one dimension.
     """
     scene = Scene.read(run, choose_times(run.history) if times is None else times, magnified)
-    flat = scene.points.shape[1] == 2
-    with_states = flat and scene.contact is not None
-    rows = [flat, flat] if with_states else [flat]
-    figure, axes = sheet(rows, len(scene.times), (4.2, 3.8))
+    if scene.points.shape[1] == 2:
+        figure, axes = _lay_out_plane(scene, "slip" in run.history)
+    else:
+        figure, axes = sheet([False], len(scene.times), (4.2, 3.8))
+        scene.stresses.draw_bar(figure, list(axes[0]), extend="max")
     for row, line in enumerate(axes):
         for k, axis in enumerate(line):
             scene.draw(axis, k, states=row > 0)
             axis.set_title(f"t = {scene.times[k]:.4g} s", fontsize=9)
-    scene.stresses.draw_bar(figure, list(axes[0]), extend="max")
-    if with_states:
-        scene.pressures.draw_bar(figure, list(axes[0]))
-        name_states(figure, "slip" in run.history)
+            if scene.points.shape[1] == 2:
+                axis.set_xlabel(axis.get_xlabel() if row == len(axes) - 1 else "")
+                axis.set_ylabel(axis.get_ylabel() if k == 0 else "")
     return save(figure, path, _compose_title(title, scene))
+
+
+def _lay_out_plane(scene: Scene, frictional: bool) -> tuple[Any, Array]:
+    """Make (figure, axes (rows, times)) of bodies in the plane.
+
+    Panels are as high as what they show. The last column has the colour bars and, where panels show
+    a part of the model, the whole of it.
+    """
+    require_matplotlib()
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    low, high = scene.window
+    ratio = float((high - low)[1] / (high - low)[0])
+    height = float(np.clip((PANEL - NUMBERS) * ratio, *HEIGHTS))
+    rows = 1 if scene.contact is None else 2
+    columns = len(scene.times)
+    with matplotlib.rc_context(STYLE | SMALL):
+        figure = Figure(
+            figsize=(PANEL * columns + BESIDE, rows * (height + 0.45) + 0.9), layout="constrained"
+        )
+        grid = figure.add_gridspec(rows, columns + 1, width_ratios=[*[PANEL] * columns, BESIDE])
+        axes = np.empty((rows, columns), dtype=object)
+        for row in range(rows):
+            for column in range(columns):
+                axes[row, column] = figure.add_subplot(grid[row, column])
+
+        # The colour bars beside the first row.
+        room = figure.add_subplot(grid[0, columns])
+        room.set_axis_off()
+        scene.stresses.fill_bar(figure, room.inset_axes([0.0, 0.0, 0.1, 1.0]), extend="max")
+        if rows == 2:
+            scene.pressures.fill_bar(figure, room.inset_axes([0.55, 0.0, 0.1, 1.0]))
+            name_states(figure, frictional)
+            if scene.zoomed:
+                scene.draw_whole(figure.add_subplot(grid[1, columns]))
+    return figure, axes
 
 
 def _compose_title(title: str, scene: Scene) -> str:
     """Return a title on lines that fit above the picture, with the factor of displacements."""
-    factor = f" (displacements x {scene.magnified:g})" if scene.magnified != 1.0 else ""
-    return "\n".join(wrap(escape_dollars(title) + factor, 64))
+    factor = ""
+    if scene.magnified != 1.0:
+        factor = f" (displacements{TOGETHER}x{TOGETHER}{scene.magnified:g})"
+    lines = wrap(escape_dollars(title) + factor, 64)
+    return "\n".join(lines).replace(TOGETHER, " ")
 
 
 @check_arguments

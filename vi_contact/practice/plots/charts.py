@@ -3,7 +3,7 @@
 Charts are numbers: the printed page and the one for browsers draw the same.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,7 +17,16 @@ from ..engineering.floor_spectra import recorded_motion
 from ..ground_motion.processing import filtered
 from ..ground_motion.record import Record
 from ..ground_motion.spectra import response_spectrum
-from .histories import LEDGER, list_shaken_axes, panels, plain_numbers, scale_values
+from .histories import (
+    LEDGER,
+    draw_curve,
+    fit_title,
+    list_shaken_axes,
+    panels,
+    plain_numbers,
+    put_legend_above,
+    scale_values,
+)
 from .records import SAMPLES_A_PERIOD
 
 # What is no more than this is nothing: a term of energy over the largest one, and the range of a
@@ -28,7 +37,11 @@ FIRST_PERIOD = 0.02  # s, of a spectrum: 50 Hz, beyond which engineers ask for n
 LOW_PASS = 25.0
 STEPS_A_PERIOD = 5
 CURVES = 8  # of probes in an overview: beyond, nobody tells them apart
+# What is never larger than this part of the largest curve of an axis has an axis of its own.
+SEEN = 0.1
+TITLE_PAD = 3.0  # points, between a legend and the title above it
 Run = Any  # a Solution, or a RunFolder, which needs h5py
+UnitChoice = Callable[[str, str], tuple[float, str]]
 
 
 @dataclass(frozen=True)
@@ -40,8 +53,8 @@ class Line:
         x: (n,).
         y: (n,).
         pale: whether the numbers say little.
-        colour: in print; None: the next one.
-        style: in print, as of matplotlib.
+        colour: in print; None: that of its place on the axis.
+        style: in print, as of matplotlib, "." for dots; "-": that of its place on the axis.
     """
 
     name: str
@@ -74,6 +87,12 @@ class Chart:
     log_y: bool = False
     bound: float | None = None
 
+    @property
+    def places(self) -> dict[str, int]:
+        """Return the number of each name, by which its curves have their look."""
+        names = dict.fromkeys(line.name for line in self.lines)
+        return {name: place for place, name in enumerate(names)}
+
     def shorten(self, count: int) -> "Chart":
         """Return the chart with the lines of its first so many names."""
         names = list(dict.fromkeys(line.name for line in self.lines))[:count]
@@ -94,16 +113,20 @@ def chart_motion(run: Run) -> list[Chart]:
     return charts
 
 
-def chart_histories(run: Run, groups: Mapping[str, Sequence[str]]) -> list[Chart]:
+def chart_histories(
+    run: Run, groups: Mapping[str, Sequence[str]], choose_unit: UnitChoice | None = None
+) -> list[Chart]:
     """Chart what moves during a run.
 
     Args:
         run: Solution or RunFolder.
         groups: title of a chart -> beginnings of names of columns, of which the first whose columns
             move is charted.
+        choose_unit: as of ``chart_columns``.
 
     Returns:
-        a chart for every title whose columns move; of these, those with the unit of the first.
+        charts for every title whose columns move; of these, those with the unit of the first. What
+        is never larger than a tenth of the largest of them has a chart of its own.
     """
     charts = []
     for title, prefixes in groups.items():
@@ -112,27 +135,67 @@ def chart_histories(run: Run, groups: Mapping[str, Sequence[str]]) -> list[Chart
             if names:
                 unit, *_ = run.columns[names[0]]
                 same = [name for name in names if run.columns[name][0] == unit]
-                charts.append(chart_columns(run, same, title))
+                charts += _chart_sizes(run, same, title, prefix, choose_unit)
                 break
     return charts
 
 
-def chart_columns(run: Run, names: Sequence[str], title: str) -> Chart:
-    """Chart the histories of columns, with a prefix of the unit that fits.
+def _chart_sizes(
+    run: Run,
+    names: Sequence[str],
+    title: str,
+    prefix: str,
+    choose_unit: UnitChoice | None,
+) -> list[Chart]:
+    """Chart columns of one unit and beginning, those of very different sizes apart.
+
+    Largest come first. Titles of charts that stand apart name what is on them.
+    """
+    sizes = {name: float(np.nanmax(np.abs(run.history[name]))) for name in names}
+    groups: list[list[str]] = []
+    largest = 0.0
+    for name in sorted(names, key=lambda name: -sizes[name]):
+        if not groups or sizes[name] < SEEN * largest:
+            groups.append([])
+            largest = sizes[name]
+        groups[-1].append(name)
+    if len(groups) == 1:
+        return [chart_columns(run, names, title, choose_unit)]
+    charts = []
+    for group in groups:
+        parts = [name.removeprefix(prefix) for name in group]
+        named = f"{title}: {', '.join(parts)}"
+        charts.append(chart_columns(run, group, named, choose_unit))
+    return charts
+
+
+def chart_columns(
+    run: Run, names: Sequence[str], title: str, choose_unit: UnitChoice | None = None
+) -> Chart:
+    """Chart the histories of columns.
 
     Args:
         run: Solution or RunFolder.
         names: columns of one unit.
         title: stands above.
+        choose_unit: returns (factor, name of the unit) for a column and its SI unit; None: the SI
+            unit with the prefix that fits.
     """
     unit, *_ = run.columns[names[0]]
-    values, prefixed = scale_values(np.array([run.history[name] for name in names]), unit)
+    values = np.array([run.history[name] for name in names])
+    if choose_unit is None:
+        values, prefixed = scale_values(values, unit)
+    else:
+        factor, prefixed = choose_unit(names[0], unit)
+        values = factor * values
     lines = [Line(name, run.history["t"], row) for name, row in zip(names, values, strict=True)]
     return Chart(title, "time [s]", f"[{prefixed}]", tuple(lines))
 
 
-def chart_groups(run: Run, groups: Sequence[Sequence[str]]) -> list[Chart]:
-    """Chart each group of columns.
+def chart_groups(
+    run: Run, groups: Sequence[Sequence[str]], choose_unit: UnitChoice | None = None
+) -> list[Chart]:
+    """Chart each group of columns; ``choose_unit`` as of ``chart_columns``.
 
     InputError for columns that do not exist, or of different units.
     """
@@ -144,7 +207,7 @@ def chart_groups(run: Run, groups: Sequence[Sequence[str]]) -> list[Chart]:
             raise InputError(
                 f"columns {', '.join(group)} have different units: draw one chart for each unit"
             )
-    return [chart_columns(run, group, ", ".join(group)) for group in groups]
+    return [chart_columns(run, group, ", ".join(group), choose_unit) for group in groups]
 
 
 def list_varying(run: Run, prefix: str) -> list[str]:
@@ -235,8 +298,7 @@ def chart_energy(run: Run) -> Chart | None:
     present = [entry for entry in LEDGER if sizes.get(entry[0], 0.0) > least]
     values, unit = scale_values(np.array([history[name] for name, *_ in present]), "J")
     lines = [
-        Line(label, history["t"], row, colour=colour, style=style)
-        for row, (_, label, colour, style) in zip(values, present, strict=True)
+        Line(label, history["t"], row) for row, (_, label, *_) in zip(values, present, strict=True)
     ]
     return Chart("energy", "time [s]", f"[{unit}]", tuple(lines))
 
@@ -263,12 +325,10 @@ def chart_certificate(run: Run) -> Chart:
 
 
 def draw_chart(axis: Any, chart: Chart) -> None:
-    """Draw a chart with its title on the left and the legend beside it."""
-    colours: dict[str, Any] = {}
+    """Draw a chart with its title on the left and the legend between it and the curves."""
+    places = chart.places
     for line in chart.lines:
-        look = _choose_look(line, chart.log_x, colours.get(line.name))
-        (curve,) = axis.plot(line.x, line.y, **look)
-        colours[line.name] = curve.get_color()
+        draw_curve(axis, line.x, line.y, places[line.name], **_choose_look(line, chart.log_x))
     if chart.log_x:
         axis.set_xscale("log")
         plain_numbers(axis.xaxis)
@@ -277,60 +337,39 @@ def draw_chart(axis: Any, chart: Chart) -> None:
         axis.set_yscale("log")
         # powers of ten are formulas, which the page does not read
         axis.yaxis.set_major_formatter("{x:.0e}")
+    elif not chart.log_y:
+        # The number that matplotlib would take off all ticks stands where the legend is.
+        axis.ticklabel_format(axis="y", useOffset=False)
     if chart.bound is not None:
         label = f"tolerance {chart.bound:g}"
         axis.axhline(chart.bound, color="tab:red", ls="--", lw=0.8, label=label)
-    axis.set_title(chart.title, loc="left")
-    _add_legend(axis)
+    legend = put_legend_above(axis, 6.0)
+    axis.set_title(fit_title(axis, chart.title), loc="left", pad=legend + TITLE_PAD)
     if not chart.log_x:
         axis.margins(x=0.0)
     axis.set(xlabel=chart.x, ylabel=chart.y)
 
 
-def _choose_look(line: Line, log_x: bool, colour: Any) -> dict[str, Any]:
-    """Choose matplotlib's arguments for a line.
+def _choose_look(line: Line, log_x: bool) -> dict[str, Any]:
+    """Choose what of a line is not the look of its place on the axis.
 
     Args:
         line: what is drawn.
         log_x: whether the axis is logarithmic: in a spectrum a pale line belongs to the one of its
             name before it, in a history it is one of its own.
-        colour: of the line of the same name before it, None where there is none.
     """
-    look: dict[str, Any] = {
-        "lw": 0.8,
-        "ls": line.style,
-        "label": line.name,
-        "color": line.colour,
-    }
+    look: dict[str, Any] = {"label": line.name}
+    if line.colour is not None:
+        look["color"] = line.colour
     if line.style == ".":
-        look = {"ls": "none", "marker": ".", "ms": 2, "color": "black"}
-    if line.pale:
-        look |= {"alpha": 0.35, "zorder": 1.5}
-        if log_x:
-            look |= {"label": None, "color": colour}
-        else:
-            look |= {"label": line.name, "color": "0.3"}
-    return {name: value for name, value in look.items() if value is not None}
-
-
-def _add_legend(axis: Any) -> None:
-    """Add the legend of an axis on the right of its title, on one line or two."""
-    labels = len(axis.get_legend_handles_labels()[1])
-    if not labels:
-        return
-    lines = 1 if labels < 6 else 2
-    columns = -(-labels // lines)  # rounded up
-    axis.legend(
-        fontsize=6 if columns < 4 else 5.5,
-        ncol=columns,
-        loc="lower right",
-        bbox_to_anchor=(1.0, 0.99),
-        frameon=False,
-        handlelength=0.8,
-        handletextpad=0.4,
-        columnspacing=0.7,
-        borderpad=0.1,
-    )
+        look |= {"ls": "none", "marker": ".", "ms": 2, "markevery": None}
+    elif line.style != "-":
+        look |= {"ls": line.style, "marker": None}
+    if line.pale and log_x:
+        look |= {"label": None, "alpha": 0.35, "zorder": 1.5, "marker": None}
+    elif line.pale:
+        look |= {"color": "0.7", "lw": 0.6, "ls": "solid", "marker": None, "zorder": 1.5}
+    return look
 
 
 def plot_overview(run: Run) -> Any:

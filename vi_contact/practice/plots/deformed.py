@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...core.algebra import Array, Indices
+from ...core.algebra import Array, Indices, Mask
 from ...core.arguments import check_arguments
 from ...core.checks import array
 from ...core.errors import InputError, is_of_machine
@@ -80,6 +80,25 @@ class StoredFrames:
         cells = np.repeat(np.arange(count), corners)
         nodes = count + self.cells.ravel()
         return number_parts(count + len(self.points), cells, nodes)[:count]
+
+    def find_structure(self, up: int) -> Mask:
+        """Return which cells (c,) are of bodies that own no side of the box round the model.
+
+        The upper side counts for nothing: structures reach up to it. All other bodies are ground.
+        Nothing is of the structure where every body is ground, everything where none is.
+
+        up: number of the axis that points upwards.
+        """
+        sides, cell = self.boundary
+        low = self.points[self.cells].min(axis=(0, 1))
+        high = self.points[self.cells].max(axis=(0, 1))
+        reach = SAME * float((high - low).max())
+        corners = self.points[sides]
+        on_low = np.all(np.abs(corners - low) <= reach, axis=1)
+        on_high = np.all(np.abs(corners - high) <= reach, axis=1)
+        on_high[:, up] = False
+        owner = self.bodies[cell[np.any(on_low | on_high, axis=1)]]
+        return ~np.isin(self.bodies, owner)
 
     @cached_property
     def boundary(self) -> tuple[Indices, Indices]:

@@ -31,8 +31,10 @@ from .histories import STYLE, History, escape_dollars, length_unit, require_matp
 
 ARROW = 0.15  # length of the longest arrow, over the size of the largest face
 NEIGHBOURS = 24  # nearest points that make one face if they point the same way
-# State -> what it is called, and its colour.
-STATES = {OPEN: ("open", "white"), STICK: ("stick", "tab:blue"), SLIP: ("slip", "tab:orange")}
+# State -> what it is called, and its colour: in grey white, dark and between.
+STATES = {OPEN: ("open", "white"), STICK: ("stick", "#3f7fbf"), SLIP: ("slip", "#f5a623")}
+# Colours of pressures that pull and press: lightness falls all the way, the hue changes at zero.
+PULLS = ("#e8f4ff", "#9ecae8", "#b0a090", "#b03020", "#3a0606")
 
 
 @dataclass(frozen=True)
@@ -169,19 +171,23 @@ class Painter:
         """Make the colours for all drawn pressures [Pa].
 
         Open points are white, on a root scale, as edges of faces carry much more than the rest;
-        where some points pull, these are drawn blue, on a linear one.
+        where some points pull, these are drawn blue and lighter than zero, on a linear one.
         """
         from matplotlib import colormaps
-        from matplotlib.colors import ListedColormap, Normalize, PowerNorm
+        from matplotlib.colors import (
+            LinearSegmentedColormap,
+            ListedColormap,
+            Normalize,
+            PowerNorm,
+        )
 
         largest = float(np.abs(pressure).max(initial=0.0)) or 1.0
         factor, unit = scale(largest, "Pa")
         label = f"contact pressure [{unit}]"
         size = factor * largest
         if np.any(pressure < 0.0):
-            return cls(
-                Normalize(-size, size), colormaps["RdBu_r"], f"{label}, negative: pull", factor
-            )
+            pulls = LinearSegmentedColormap.from_list("pulls", PULLS)
+            return cls(Normalize(-size, size), pulls, f"{label}, negative: pull", factor)
         palette = colormaps["YlOrRd"](np.linspace(0.0, 1.0, 256))
         palette[0] = 1.0  # zero, and on this scale less than 2e-5 of the largest
         return cls(
@@ -209,6 +215,14 @@ class Painter:
         mappable = ScalarMappable(self.norm, self.cmap)
         figure.colorbar(mappable, ax=axes, label=self.label, fraction=0.04, aspect=25, **look)
 
+    def fill_bar(self, figure: Any, axis: Any, **look: Any) -> None:
+        """Draw the colour bar on an axis of its own."""
+        from matplotlib.cm import ScalarMappable
+
+        axis.grid(False)
+        mappable = ScalarMappable(self.norm, self.cmap)
+        figure.colorbar(mappable, cax=axis, label=self.label, **look)
+
     def draw_values(self, axis: Any, face: Face, values: Array) -> None:
         """Draw the values on a face.
 
@@ -230,13 +244,14 @@ class Painter:
         # with room for arrows
         set_limits(axis, places.min(axis=0), places.max(axis=0), names, margin=1.2 * ARROW)
 
-    def draw_dots(self, axis: Any, places: Array, values: Array) -> None:
+    def draw_dots(self, axis: Any, places: Array, values: Array, size: float = 24.0) -> None:
         """Draw values as dots.
 
         Args:
             axis: in projection where the places are in space.
             places: (k, d) of the dots [m].
             values: (k,) of the dots.
+            size: area of a dot [square points].
         """
         look = {
             "norm": self.norm,
@@ -245,7 +260,7 @@ class Painter:
             "linewidths": 0.4,
             "zorder": 4,
         }
-        axis.scatter(*places.T, c=self.factor * values, s=24, **look)
+        axis.scatter(*places.T, c=self.factor * values, s=size, **look)
 
 
 def add_polygons(axis: Any, polygons: Array, **look: Any) -> Any:

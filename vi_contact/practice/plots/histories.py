@@ -5,7 +5,8 @@ settings change.
 """
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -29,17 +30,178 @@ _PREFIXES = (
 )
 # How all pictures of this room look; matplotlib's own settings are left alone.
 STYLE = {"axes.grid": True, "grid.alpha": 0.3, "axes.spines.top": False, "axes.spines.right": False}
-# Curves of the energy ledger: column, label, colour, line.
+# Curves of the energy ledger: column, label, colour, line. Each differs by its dashes too.
 LEDGER = (
-    ("work_input", "input work", "black", "-"),
-    ("energy_kinetic", "kinetic", "tab:blue", "-"),
-    ("energy_strain", "strain", "tab:orange", "-"),
-    ("loss_damping", "damping", "tab:purple", "-"),
-    ("loss_contact", "contact work", "tab:red", "-"),
-    ("loss_friction", "friction", "tab:cyan", "-"),
-    ("loss_impact", "impact loss", "tab:green", "-"),
-    ("loss_algorithmic", "algorithmic", "tab:brown", ":"),
+    ("work_input", "input work", "#1a1a1a", "-"),
+    ("energy_kinetic", "kinetic", "#2b6cb0", "--"),
+    ("energy_strain", "strain", "#c8401e", (0, (7, 1))),
+    ("loss_damping", "damping", "#6a3d9a", "-."),
+    ("loss_contact", "contact work", "#e69f00", (0, (1, 1))),
+    ("loss_friction", "friction", "#17a2b8", (0, (4, 1, 1, 1, 1, 1))),
+    ("loss_impact", "impact loss", "#2a7d2a", (0, (2, 2))),
+    ("loss_algorithmic", "algorithmic", "#8c6d5f", ":"),
 )
+
+
+@dataclass(frozen=True)
+class Look:
+    """Hold how a curve is told from others in colour and in grey.
+
+    Attributes:
+        colour: of the line.
+        dash: "solid", "dashed", "dashdot" or "dotted".
+        marker: at some of its points, as of matplotlib; none when empty.
+    """
+
+    colour: str
+    dash: str
+    marker: str
+
+
+# Of the curves of an axis in their order: dash and marker together are another one's nowhere.
+LOOKS = (
+    Look("#1a1a1a", "solid", ""),
+    Look("#c8401e", "dashed", ""),
+    Look("#2b6cb0", "solid", "o"),
+    Look("#e69f00", "dashdot", ""),
+    Look("#6a3d9a", "solid", "s"),
+    Look("#17a2b8", "dashed", "^"),
+    Look("#8c6d5f", "solid", "x"),
+    Look("#2a7d2a", "dashdot", "D"),
+    Look("#d65fb0", "dotted", "v"),
+    Look("#7f7f7f", "dotted", "+"),
+)
+MARKERS = 8  # of a curve: more would hide it
+# Of a legend, over the size of its letters: mean width of a letter, of the line before a text with
+# what is around both, and height of a row.
+LETTER = 0.62
+HANDLE = 4.6
+ROW = 1.5
+
+
+def choose_look(place: int) -> Look:
+    """Return the look of the curve number ``place`` of an axis; looks recur after ten."""
+    return LOOKS[place % len(LOOKS)]
+
+
+def draw_curve(axis: Any, x: Array, y: Array, place: int, **more: Any) -> Any:
+    """Draw the curve number ``place`` of an axis with its look; return matplotlib's line.
+
+    ``more`` are arguments of matplotlib's ``plot``, which come before the look.
+    """
+    look = choose_look(place)
+    # Markers of neighbours are not at the same points.
+    every = max(len(x) // MARKERS, 1)
+    first = (every * place // len(LOOKS)) % every
+    drawn: dict[str, Any] = {"color": look.colour, "ls": look.dash, "lw": 0.9}
+    if look.marker:
+        drawn |= {"marker": look.marker, "markevery": (first, every), "ms": 3.5, "mew": 0.8}
+        drawn |= {"mfc": "white"}
+    (line,) = axis.plot(x, y, **(drawn | more))
+    return line
+
+
+def put_legend_above(axis: Any, size: float = 7.0) -> float:
+    """Put the legend of an axis between its title and its curves, in as many rows as it needs.
+
+    Without a layout engine the axis is made lower by as much; else the engine makes room.
+
+    Args:
+        axis: matplotlib's.
+        size: of the letters [points].
+
+    Returns:
+        the height of the legend [points], above which a title has to stand; zero where nothing has
+        a name.
+    """
+    handles, labels = axis.get_legend_handles_labels()
+    if not labels:
+        return 0.0
+    figure = axis.figure
+    points = 72.0 / figure.dpi
+    box = axis.get_window_extent()
+    width = max(box.width * points, 20.0 * size)
+
+    labels, columns = arrange_names(labels, width, size)
+    rows = -(-len(labels) // columns)  # rounded up
+    height = ROW * size * rows + 2.0
+    axis.legend(
+        handles,
+        labels,
+        fontsize=size,
+        ncol=columns,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        frameon=False,
+        handlelength=2.8,
+        handletextpad=0.5,
+        columnspacing=1.0,
+        labelspacing=0.25,
+        borderpad=0.1,
+        borderaxespad=0.2,
+    )
+    if figure.get_layout_engine() is None:
+        place = axis.get_position()
+        lower = height / (points * figure.bbox.height)
+        axis.set_position([place.x0, place.y0, place.width, max(place.height - lower, 0.01)])
+    return height
+
+
+def arrange_names(names: Sequence[str], width: float, size: float) -> tuple[list[str], int]:
+    """Return the names of a legend, cut where one is wider than its room, and its columns.
+
+    Args:
+        names: at least one.
+        width: of the room [points].
+        size: of the letters [points].
+    """
+    letters = max(int(width / (LETTER * size) - HANDLE / LETTER), 2)
+    shown = [cut(name, letters) for name in names]
+    widest = size * (LETTER * max(map(len, shown)) + HANDLE)
+    return shown, max(1, min(len(shown), int(width / widest)))
+
+
+def put_legend_on_top(figure: Any, handles: Sequence[Any], names: Sequence[str]) -> None:
+    """Put a legend above all axes of a figure with a layout engine, as wide as the figure at most.
+
+    Args:
+        figure: matplotlib's, without a title.
+        handles: of the curves.
+        names: of the curves.
+    """
+    if not names:
+        return
+    size = 8.0
+    shown, columns = arrange_names(names, 72.0 * float(figure.get_figwidth()) - 20.0, size)
+    rows = -(-len(shown) // columns)  # rounded up
+    figure.set_figheight(figure.get_figheight() + (rows - 1) * ROW * size / 72.0)
+    # keeps room for the legend, which the layout of matplotlib 3.6 does not
+    figure.suptitle("\n".join([" "] * (rows + 1)), fontsize=size, linespacing=ROW)
+    figure.legend(
+        handles,
+        shown,
+        loc="upper center",
+        ncol=columns,
+        fontsize=size,
+        frameon=False,
+        handlelength=2.8,
+        columnspacing=1.0,
+    )
+
+
+def fit_title(axis: Any, title: str) -> str:
+    """Return a title cut to the width of its axis, or it would run over its neighbour's."""
+    from matplotlib import rcParams
+    from matplotlib.font_manager import FontProperties
+
+    size = FontProperties(size=rcParams["axes.titlesize"]).get_size_in_points()
+    width = axis.get_window_extent().width * 72.0 / axis.figure.dpi
+    return cut(title, int(width / (LETTER * size)))
+
+
+def cut(text: str, letters: int) -> str:
+    """Return a text of at most so many letters, the last of which tells that it was cut."""
+    return text if len(text) <= letters else text[: letters - 1] + "…"
 
 
 def canvas(

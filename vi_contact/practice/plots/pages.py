@@ -28,17 +28,15 @@ class _Pages:
     """Fill pages from the top.
 
     Attributes:
-        file: the PDF that takes finished pages.
         foot: text at the foot of every page, before its number.
-        count: number of the page.
+        figures: all pages so far.
         figure: the page.
         y: where the next thing goes, from the top [inches].
     """
 
-    def __init__(self, file: Any, foot: str) -> None:
-        self.file = file
+    def __init__(self, foot: str) -> None:
         self.foot = foot
-        self.count = 0
+        self.figures: list[Any] = []
         self.begin()
 
     def begin(self) -> None:
@@ -46,14 +44,20 @@ class _Pages:
         from matplotlib.figure import Figure
 
         self.figure = Figure(figsize=PAGE)
+        self.figures.append(self.figure)
         self.y = SIDE
-        self.count += 1
-        self._write(SIDE, PAGE[1] - 0.4, f"{self.foot}, page {self.count}", 6.5, color="0.45")
+
+    def end(self, file: Any) -> None:
+        """Write the feet of all pages, and the pages into a PDF."""
+        for number, figure in enumerate(self.figures, start=1):
+            self.figure = figure
+            foot = f"{self.foot}, page {number} of {len(self.figures)}"
+            self._write(SIDE, PAGE[1] - 0.4, foot, 6.5, color="0.45")
+            file.savefig(figure)
 
     def make_room(self, height: float) -> None:
         """Turn the page where so much [inches] no longer fits."""
         if self.y + height > PAGE[1] - FOOT:
-            self.file.savefig(self.figure)
             self.begin()
 
     def _write(self, x: float, y: float, text: str, size: float, **look: Any) -> None:
@@ -75,6 +79,16 @@ class _Pages:
         self.make_room(step * len(lines) + keep)
         self._write(SIDE, self.y, "\n".join(lines), size, linespacing=1.2, **look)
         self.y += step * len(lines) + 0.05
+
+    def write_facts(self, facts: Sequence[tuple[str, str]]) -> None:
+        """Write (name, value) of a title block, two beside each other."""
+        pairs = [*facts, *[("", "")] * (len(facts) % 2)]
+        rows = [(*left, *right) for left, right in zip(pairs[::2], pairs[1::2], strict=True)]
+        width = int(0.5 * WIDE / LETTER)
+        names = 2 + max((len(name) for name, _ in pairs), default=0)
+        for row in rows:
+            self._write_row(row, [names, width - names] * 2, head=False)
+        self.y += 0.12
 
     def write_table(self, table: Table) -> None:
         """Write a table as wide as its texts; those of a cell that is too wide on several lines."""
@@ -134,11 +148,13 @@ class _Pages:
             self.y += height + 0.75
 
     def place_picture(self, path: Path) -> None:
-        """Place a PNG as wide as the page, or as high as half of it."""
+        """Place a PNG as wide as the page, or as high as half of it or what is left of it."""
         from matplotlib.image import imread
 
         image = imread(BytesIO(read_bytes(path)), format="png")
-        width = min(WIDE, 0.5 * PAGE[1] * image.shape[1] / image.shape[0])
+        left = PAGE[1] - FOOT - self.y
+        most = left if 0.25 * PAGE[1] < left < 0.5 * PAGE[1] else 0.5 * PAGE[1]
+        width = min(WIDE, most * image.shape[1] / image.shape[0])
         height = width * image.shape[0] / image.shape[1]
         self.make_room(height)
         axis = self.figure.add_axes(
@@ -182,10 +198,12 @@ def write_pages(
     pdf = BytesIO()
     metadata = {"Title": title, "CreationDate": None}
     with matplotlib.rc_context(STYLE | fonts), PdfPages(pdf, metadata=metadata) as file:
-        pages = _Pages(file, foot)
+        pages = _Pages(foot)
         pages.write_words(title, 15.0, weight="bold")
-        pages.write_table(Table(("", ""), facts))
+        pages.write_facts(facts)
         for section in sections:
+            if section.begins_page:
+                pages.begin()
             pages.y += 0.12
             # A heading stays with what follows: a sentence or, which is higher, a chart.
             keep = 1.2 if section.sentences or section.tables else 4.0
@@ -194,10 +212,12 @@ def write_pages(
                 pages.write_words(sentence)
             for table in section.tables:
                 pages.write_table(table)
+            for note in section.notes:
+                pages.write_words(note, 7.5)
             pages.draw_panels(section.charts, HEIGHT, 2)
             pages.draw_panels(section.drawings, 1.6 * HEIGHT, 1)
             for picture in section.pictures:
                 pages.place_picture(picture)
-        file.savefig(pages.figure)
+        pages.end(file)
     write_output(path, pdf.getvalue())
     return path

@@ -19,16 +19,19 @@ from ..ground_motion.record import UNITS, Record, canonical_units
 from ..ground_motion.spectra import ResponseSpectrum
 from .histories import (
     canvas,
+    draw_curve,
     escape_dollars,
     length_unit,
     panels,
     plain_numbers,
+    put_legend_above,
     save,
     scale_values,
 )
 
 # A spectrum is drawn pale at periods with fewer samples of the record than this.
 SAMPLES_A_PERIOD = 10
+TARGET = {"color": "black", "ls": (0, (8, 3))}  # long dashes, which no other curve has
 
 
 @check_arguments
@@ -111,33 +114,27 @@ def plot_spectra(
     )
     # The least period of each label that its record resolves.
     trusted = {label: SAMPLES_A_PERIOD * (steps or {}).get(label, 0.0) for label in spectra}
-    for label, spectrum in spectra.items():
+    for place, (label, spectrum) in enumerate(spectra.items()):
         psa = spectrum.psa / UNITS[units]
-        colour = _draw_spectrum(top, spectrum.periods, psa, trusted[label], label=label)
-        _draw_spectrum(
-            bottom,
-            spectrum.periods,
-            spectrum.displacement / metres,
-            trusted[label],
-            label=label,
-            colour=colour,
-        )
+        _draw_spectrum(top, spectrum.periods, psa, trusted[label], label, place)
+        displacement = spectrum.displacement / metres
+        _draw_spectrum(bottom, spectrum.periods, displacement, trusted[label], label, place)
     if target is not None:
         name = f"EC8 target, {100.0 * target.damping:g} %"
         grid = np.geomspace(periods.min(), periods.max(), 500)
-        top.plot(grid, target.acceleration(grid) / UNITS[units], "k--", lw=1.2, label=name)
+        top.plot(grid, target.acceleration(grid) / UNITS[units], lw=1.6, **TARGET, label=name)
         code = grid[grid <= 4.0]  # beyond, the code gives another displacement spectrum
-        bottom.plot(code, target.displacement(code) / metres, "k--", lw=1.2, label=name)
+        bottom.plot(code, target.displacement(code) / metres, lw=1.6, **TARGET, label=name)
     if any(np.min(spectrum.periods) < trusted[label] for label, spectrum in spectra.items()):
         pale = f"pale: under {SAMPLES_A_PERIOD} samples a period"
         top.plot([], [], color="0.5", lw=0.8, alpha=0.5, label=pale)
-    top.legend(fontsize=8)
+    legend = put_legend_above(top, 8.0)
     for axis in (top, bottom):
         axis.set_ylim(bottom=0.0)
     top.set(
         ylabel=f"pseudo-acceleration [{_typeset_unit(units)}]",
-        title=escape_dollars(title),
     )
+    top.set_title(escape_dollars(title), pad=legend + 4.0)
     bottom.set(
         ylabel=f"displacement [{unit}]",
         xlabel="period [s]",
@@ -147,13 +144,12 @@ def plot_spectra(
 
 
 def _draw_spectrum(
-    axis: Any, periods: Array, values: Array, trusted: float, *, label: str, colour: Any = None
-) -> Any:
-    """Draw a spectrum, pale at periods below the least that is trusted [s]; return its colour."""
+    axis: Any, periods: Array, values: Array, trusted: float, label: str, place: int
+) -> None:
+    """Draw the spectrum number ``place``, pale at periods below the least trusted one [s]."""
     resolved = np.where(periods >= trusted, values, np.nan)
-    (line,) = axis.plot(periods, resolved, lw=1.2, color=colour, label=escape_dollars(label))
+    line = draw_curve(axis, periods, resolved, place, lw=1.2, label=escape_dollars(label))
     axis.plot(periods, values, lw=0.8, color=line.get_color(), alpha=0.35)
-    return line.get_color()
 
 
 @check_arguments
@@ -187,13 +183,13 @@ def plot_loop(
     axis.plot(deformation, force, color="black", lw=0.8)
     axis.plot(deformation[:1], force[:1], "o", color="tab:green", ms=5, label="start")
     axis.plot(deformation[-1:], force[-1:], "s", color="tab:red", ms=5, label="end")
-    axis.legend(fontsize=8)
+    legend = put_legend_above(axis, 8.0)
     work, unit = scale_values(loop.work[-1:], "J")
     axis.set(
         xlabel=escape_dollars(f"{x_name} [{x_unit}]"),
         ylabel=escape_dollars(f"{y_name} [{y_unit}]"),
-        title=escape_dollars(title or f"work {work[0]:.3g} {unit}"),
     )
+    axis.set_title(escape_dollars(title or f"work {work[0]:.3g} {unit}"), pad=legend + 4.0)
     return save(figure, path)
 
 

@@ -3,7 +3,7 @@
 ``sections`` fills in the numbers.
 """
 
-# What the report says first: name -> text with entries of summary.json.
+# What the report says of the method: name -> text with entries of summary.json.
 SUMMARY = {
     "scheme": "{scheme}",
     "mass": "{mass}",
@@ -21,16 +21,24 @@ SUMMARY = {
 }
 # Charts of histories: title -> beginnings of columns; of these the first that move.
 CHARTS = {
-    "displacement": ("u_",),
-    "contact force": ("contact_resultant", "N_", "contact_force_"),
-    "uplift ratio": ("contact_uplift", "uplift_"),
-    "force of the support": ("reaction_x_", "reaction_y_", "reaction_z_"),
-    "racking and rocking": ("racking_", "theta_"),
-    "shear force": ("V_",),
-    "bending moment": ("M_", "reaction_M"),
-    "slip": ("contact_max_slip", "slip_"),
-    "absolute acceleration": ("a_x_", "a_y_", "a_z_"),
-    "contact pressure": ("contact_max_pressure",),
+    "thrust, normal force": ("N_", "contact_resultant", "contact_force_"),
+    "shear on a part": ("T_",),
+    "sliding": ("sliding_", "slip_", "contact_max_slip"),
+    "opening": ("opening_",),
+    "open share": ("uplift_", "contact_uplift"),
+    "pressure at the low end": ("pressure_low_",),
+    "pressure at the high end": ("pressure_high_", "contact_max_pressure"),
+    "moment": ("M_",),
+    "moment of a support": ("reaction_M",),
+    "force of a support along x": ("reaction_x_",),
+    "force of a support along y": ("reaction_y_",),
+    "force of a support along z": ("reaction_z_",),
+    "shear force of a section": ("V_",),
+    "rocking": ("theta_",),
+    "racking": ("racking_",),
+    "displacement along x": ("u_x_",),
+    "displacement along y": ("u_y_",),
+    "displacement along z": ("u_z_",),
 }
 # Rows of the table of results: what they are called -> beginnings of columns.
 RESULTS = {
@@ -40,7 +48,7 @@ RESULTS = {
     "shear on a part": ("T_",),
     "height of the thrust, when the thrust is largest": ("height_",),
     "height of the thrust over the height of the part, when the thrust is largest": ("level_",),
-    "uplift ratio": ("contact_uplift", "uplift_"),
+    "open share": ("contact_uplift", "uplift_"),
     "largest slip": ("contact_max_slip", "slip_"),
     "mean sliding; its end less its start is what remains": ("sliding_",),
     "eccentricity of the thrust from the middle of its part": ("e_",),
@@ -51,22 +59,9 @@ RESULTS = {
     "pressure at the end of a part where x, or y, is least": ("pressure_low_",),
     "pressure at the end of a part where x, or y, is largest": ("pressure_high_",),
 }
-# Tables of model.json: title -> key.
-MODEL_TABLES = {
-    "bodies (SI units)": "bodies",
-    "supports": "supports",
-    "contact (size in m²)": "contact",
-    "waves against the mesh (SI units)": "waves",
-}
-# Sentences of model.json: sentence -> key.
-MODEL_FACTS = {
-    "The mass is {} kg.": "mass",
-    "There are {} unknowns.": "unknowns",
-    "First natural periods with the contact closed where it touches at the start: {} s.": "periods",
-    "The damping: {}.": "damping",
-}
 # Heads of tables.
 HEADERS = {
+    "method": ("method and outcome", ""),
     "results": (
         "result",
         "column",
@@ -86,20 +81,20 @@ HEADERS = {
         "expected",
         "found",
         "unit",
-        "found / expected",
+        "ratio",
         "source",
     ),
 }
 # Sentences; numbers stand for {names}.
 SAY = {
     "untried": (
-        "The discretisation error was not measured: `vi-contact report DIR --refine` "
-        "repeats the run with half the element size and with half the time step, and "
-        "prints what changes."
+        "The discretisation error was not measured: `vi-contact report DIR --halved` "
+        "repeats the run with half the time step, `--refine` with half the element size too, "
+        "and the report says what changes."
     ),
     "refined": (
-        "The table has the largest size of every column in this run, and in runs with half "
-        "the element size (h/2) and with half the time step (dt/2). If the error falls "
+        "The table has the largest size of every column in this run, and in runs with {finer}. "
+        "If the error falls "
         "with the first power of h or dt, the error of this run is twice the difference; "
         "if it falls with the second power, it is 4/3 of the difference."
     ),
@@ -120,8 +115,7 @@ SAY = {
         "shift, {corner:.3g} Hz). When contact closes, a velocity jumps, and the raw "
         "acceleration of that step is the jump divided by the time step: it grows without "
         "limit as the time step is made shorter. Raw peak accelerations at impacts are not "
-        "convergent. Displacements, forces and accelerations below the corner frequency "
-        "are convergent."
+        "convergent."
     ),
     "certificate": (
         "Every one of the {steps} steps has a certificate: the largest residual of its "

@@ -17,21 +17,23 @@ from ...core.units import STANDARD_GRAVITY
 from ...run.files.reading import RunFolder
 from ...run.solution import energy_warning
 from ..engineering.peak_values import peaks
+from ..units.report_units import ReportUnits, write_number
 from . import charts
 from .charts import Chart
-from .histories import LEDGER, scale_values
+from .histories import LEDGER
 from .maps import Drawing, list_maps
+from .report_numbers import ReportNumbers, read_slice
 from .report_words import (
     CHARTS,
     HEADERS,
-    MODEL_FACTS,
-    MODEL_TABLES,
     RESULTS,
     SAY,
     SUMMARY,
 )
 
-NOT_SHOWN = ("places", "others", "sides")  # of what model.json tells of a contact
+# What of a part that stands upright says nothing: its thrust has a height in place of e.
+FOR_LEVEL_PARTS = ("e", "theta", "settlement")
+NOISE = 1e-6  # of the largest number in the same unit: what is smaller is rounding
 FEW_ROWS = 20  # of a history: accelerations of a run with no more are not filtered
 
 
@@ -60,21 +62,36 @@ class Section:
         title: heading.
         sentences: paragraphs.
         tables: after them.
+        notes: paragraphs after the tables.
         charts: curves.
         drawings: each draws on one axis.
         pictures: PNG files.
+        begins_page: whether it begins a page in print.
     """
 
     title: str
     sentences: Sequence[str] = ()
     tables: Sequence[Table] = ()
+    notes: Sequence[str] = ()
     charts: Sequence[Chart] = ()
     drawings: Sequence[Drawing] = ()
     pictures: Sequence[Path] = ()
+    begins_page: bool = False
+
+    @property
+    def is_empty(self) -> bool:
+        """Say whether there is nothing below the heading."""
+        shown = (self.sentences, self.tables, self.notes, self.charts, self.drawings, self.pictures)
+        return not any(shown)
 
 
 def sections_of(
-    run: RunFolder, model: Mapping[str, Any], columns: Sequence[Sequence[str]] | None = None
+    run: RunFolder,
+    model: Mapping[str, Any],
+    columns: Sequence[Sequence[str]] | None = None,
+    *,
+    inputs: Sequence[Table] = (),
+    units: ReportUnits | None = None,
 ) -> list[Section]:
     """Return the sections that a run has data for.
 
@@ -83,6 +100,8 @@ def sections_of(
         model: model.json of its folder, empty where there is none.
         columns: groups of columns of one unit, a chart each for the histories; None: those that
             move.
+        inputs: tables of what was put in, for the first section.
+        units: of the tables; None: the usual ones.
 
     Raises:
         InputError: the run has no steps, or columns do not exist or have different units.
@@ -95,25 +114,17 @@ def sections_of(
         histories = charts.chart_histories(run, CHARTS)
     else:
         histories = charts.chart_groups(run, columns)
+    numbers = ReportNumbers(units or ReportUnits(), read_slice(model))
     sections = [
-        _describe_model(model),
-        _describe_motion(run, model),
-        _tabulate_results(run),
+        _describe_model(model, inputs),
+        _describe_motion(run),
+        _tabulate_results(run, numbers),
         _compare_accelerations(run),
-        Section("Histories", charts=histories, drawings=list_maps(run)),
+        Section("Histories", charts=histories, drawings=list_maps(run, model)),
         _explain_certificate(run),
-        _tabulate_peaks(run),
+        _tabulate_peaks(run, numbers),
     ]
-    return [
-        section
-        for section in sections
-        if section.sentences or section.tables or section.charts or section.drawings
-    ]
-
-
-def format_number(value: float) -> str:
-    """Return a number with four digits, a dash for none."""
-    return "-" if np.isnan(value) else f"{value:.4g}"
+    return [section for section in sections if not section.is_empty]
 
 
 def format_value(value: Any, depth: int = 9) -> str:
@@ -130,40 +141,17 @@ def format_value(value: Any, depth: int = 9) -> str:
     return "-" if value is None else shorten(str(value), 200, placeholder=" …")
 
 
-def tabulate(title: str, rows: Any) -> list[Table]:
-    """Return the table of objects that a file lists.
-
-    It has a column for each of their keys; there is none for anything else.
-    """
-    listed = rows if isinstance(rows, list | tuple) else ()
-    objects = [row for row in listed if isinstance(row, Mapping)]
-    if not objects:
-        return []
-    keys = (key for row in objects for key in row if key not in NOT_SHOWN)
-    header = list(dict.fromkeys(keys))
-    cells = []
-    for row in objects:
-        cells.append([format_value(row.get(key)) for key in header])
-    return [Table(header, cells, title)]
-
-
-def _describe_model(model: Mapping[str, Any]) -> Section:
-    """Say what model.json tells: facts, warnings and tables of what it lists."""
-    tables = []
-    for title, key in MODEL_TABLES.items():
-        tables += tabulate(title, model.get(key))
-    sentences = [
-        text.format(format_value(model[key])) for text, key in MODEL_FACTS.items() if model.get(key)
-    ]
+def _describe_model(model: Mapping[str, Any], inputs: Sequence[Table]) -> Section:
+    """Set what was put in before all results, with what is doubted of it."""
     warnings = model.get("warnings")
+    sentences = []
     if isinstance(warnings, list):
-        sentences += [f"Warning: {format_value(warning)}." for warning in warnings]
-    return Section("Model and contact", sentences, tables)
+        sentences = [f"Warning: {format_value(warning)}." for warning in warnings]
+    return Section("Model and contact", sentences, inputs)
 
 
-def _describe_motion(run: RunFolder, model: Mapping[str, Any]) -> Section:
-    """Say how strongly the ground moved, with the records that model.json names."""
-    records = tabulate("records (SI units)", model.get("records"))
+def _describe_motion(run: RunFolder) -> Section:
+    """Say how strongly the ground moved."""
     motion = charts.chart_motion(run)
     sentences = []
     if motion:
@@ -172,52 +160,73 @@ def _describe_motion(run: RunFolder, model: Mapping[str, Any]) -> Section:
             peak = np.max(np.abs(run.history[line.name])) / STANDARD_GRAVITY
             texts.append(f"{peak:.3g} g along {line.name[-1]}")
         sentences = [SAY["shaken"].format(peaks=" and ".join(texts)), SAY["spectrum"]]
-    return Section("Ground motion", sentences, records, motion)
+    return Section("Ground motion", sentences, charts=motion)
 
 
-def _tabulate_results(run: RunFolder) -> Section:
+def _tabulate_results(run: RunFolder, numbers: ReportNumbers) -> Section:
     """Tabulate forces, sliding and the like, and how far each part is from sliding."""
     results: list[list[str]] = []
     for title, prefixes in RESULTS.items():
-        results += _list_results(run, title, tuple(prefixes))
+        results += _list_results(run, numbers, title, tuple(prefixes))
     safety = list(_list_safety(run))
     tables = [Table(HEADERS["results"], results), Table(HEADERS["safety"], safety)]
     return Section(
-        "Base shear, thrust, uplift and sliding",
+        "Base shear, thrust, open share and sliding",
         [SAY["safety"]] if safety else [],
         [table for table in tables if table.rows],
     )
 
 
-def _list_results(run: RunFolder, title: str, prefixes: tuple[str, ...]) -> Iterable[list[str]]:
+def _list_results(
+    run: RunFolder, numbers: ReportNumbers, title: str, prefixes: tuple[str, ...]
+) -> Iterable[list[str]]:
     """Yield the rows of the columns that begin so.
 
     Of heights, the row is at the largest thrust, for without thrust they say nothing.
+
+    Args:
+        run: what ``read_run`` returned.
+        numbers: writes them.
+        title: what the columns are.
+        prefixes: their beginnings.
     """
     t = run.history["t"]
+    scales = find_scales(run)
     for name in run.columns:
         values = run.history.get(name)
         if not name.startswith(prefixes) or values is None:
             continue
         if values.ndim != 1 or np.isnan(values).all():
             continue
+        unit = run.columns[name][0]
+        if np.nanmax(np.abs(values)) <= NOISE * scales[unit]:
+            continue  # such as the height of the thrust on a level part
         kind, _, part = name.partition("_")
-        if kind == "height" and not np.nan_to_num(values).any():
-            continue  # the thrust on a level part has no height
+
+        is_upright = np.isfinite(run.history.get(f"level_{part}", np.nan)).any()
+        if kind in FOR_LEVEL_PARTS and is_upright:
+            continue
 
         # When the result is largest in size; heights count where they are numbers.
         thrust = run.history.get(f"N_{part}") if kind in ("height", "level") else None
         row = int(np.nanargmax(np.abs(values) if thrust is None else thrust + 0.0 * values))
-        scaled, unit = scale_values(values, run.columns[name][0])
-        yield [
-            title,
-            name,
-            unit,
-            format_number(scaled[row]),
-            format_number(t[row]),
-            format_number(scaled[0]),
-            format_number(scaled[-1]),
-        ]
+        factor, unit = numbers.choose_unit(name, unit)
+        of_rows = [factor * float(values[place]) for place in (row, 0, -1)]
+        scaled = [of_rows[0], float(t[row]), *of_rows[1:]]
+        yield [title, name, unit, *map(write_number, scaled)]
+
+
+def find_scales(run: RunFolder) -> dict[str, float]:
+    """Return SI unit -> the largest size of a number in the columns of this unit.
+
+    What is smaller than ``NOISE`` of it is rounding.
+    """
+    scales: dict[str, float] = defaultdict(float)
+    for name, (unit, _) in run.columns.items():
+        values = run.history.get(name, np.array([]))
+        if values.ndim == 1 and not np.isnan(values).all():
+            scales[unit] = max(scales[unit], float(np.nanmax(np.abs(values))))
+    return scales
 
 
 def _list_safety(run: RunFolder) -> Iterable[list[str]]:
@@ -235,9 +244,9 @@ def _list_safety(run: RunFolder) -> Iterable[list[str]]:
         last = 1.0 / used[-1] if used[-1] > 0.0 else np.inf
         yield [
             name.removeprefix("margin_"),
-            format_number(1.0 / used[row]),
-            format_number(run.history["t"][row]),
-            format_number(last),
+            write_number(1.0 / used[row]),
+            write_number(run.history["t"][row]),
+            write_number(last),
         ]
 
 
@@ -258,7 +267,7 @@ def _compare_accelerations(run: RunFolder) -> Section:
         low = float(np.max(np.abs(smooth.acceleration)))
         high = float(np.max(np.abs(raw.acceleration)))
         numbers = (low, low / STANDARD_GRAVITY, high, high / STANDARD_GRAVITY)
-        rows.append([name, *map(format_number, numbers)])
+        rows.append([name, *map(write_number, numbers)])
     below = f"peak below {corner:.3g} Hz [m/s²]"
     table = Table(
         ("column", below, "[g]", "raw peak, not convergent at impacts [m/s²]", "[g]"),
@@ -266,7 +275,8 @@ def _compare_accelerations(run: RunFolder) -> Section:
         sortable=True,
     )
     curves = [charts.chart_acceleration(run, name, *motions[name]) for name in names[:2]]
-    return Section(title, [SAY["accelerations"].format(corner=corner)], [table], curves)
+    sentences = [SAY["accelerations"].format(corner=corner)]
+    return Section(title, sentences, [table], charts=curves)
 
 
 def _explain_certificate(run: RunFolder) -> Section:
@@ -283,7 +293,7 @@ def _explain_certificate(run: RunFolder) -> Section:
         why = facts.get("reason") or facts.get("status") or "killed, or going on"
         sentences.append(SAY["unfinished"].format(why=why))
 
-    tables = []
+    tables = [Table(HEADERS["method"], header_facts(run))]
     curves = []
     energy = charts.chart_energy(run)
     if energy is not None:
@@ -296,7 +306,7 @@ def _explain_certificate(run: RunFolder) -> Section:
 
     warnings = (energy_warning(facts), facts.get("sampling"))
     sentences += [f"Warning: {warning}." for warning in warnings if warning]
-    return Section("Certificate and energies in words", sentences, tables, curves)
+    return Section("Solver, certificate and energies", sentences, tables, charts=curves)
 
 
 def _tabulate_energies(run: RunFolder, most: float) -> Table:
@@ -305,26 +315,26 @@ def _tabulate_energies(run: RunFolder, most: float) -> Table:
     for name, label, *_ in LEDGER:
         end = float(run.history[name][-1]) if name in run.history else 0.0
         if end:
-            rows.append([label, format_number(end), format_number(end / most)])
+            rows.append([label, write_number(end), write_number(end / most)])
     return Table(HEADERS["energies"], rows)
 
 
-def _tabulate_peaks(run: RunFolder) -> Section:
-    """Tabulate the largest and the smallest value of every column."""
+def _tabulate_peaks(run: RunFolder, numbers: ReportNumbers) -> Section:
+    """Tabulate the largest and the smallest value of every column that has values but zero."""
     rows = []
     for peak in peaks(run.history, run.columns):
-        numbers = (peak.max, peak.t_max, peak.min, peak.t_min)
-        rows.append([peak.name, peak.quantity, peak.unit, *map(format_number, numbers)])
+        if not np.nan_to_num([peak.max, peak.min]).any():
+            continue
+        factor, unit = numbers.choose_unit(peak.name, peak.unit)
+        values = (factor * peak.max, peak.t_max, factor * peak.min, peak.t_min)
+        rows.append([peak.name, peak.quantity, unit, *map(write_number, values)])
     return Section(
         "Peak values of all columns", tables=[Table(HEADERS["peaks"], rows, sortable=True)]
     )
 
 
 def header_facts(run: RunFolder) -> list[tuple[str, str]]:
-    """Return (name, value) of what the report says first.
-
-    They are of the method, and of the outcome; a dash is for what is unknown.
-    """
+    """Return (name, value) of the method of a run and of its outcome; a dash where unknown."""
     t = run.history["t"]
     facts = {key: value for key, value in run.facts.items() if value is not None}
     facts |= {
@@ -338,7 +348,7 @@ def header_facts(run: RunFolder) -> list[tuple[str, str]]:
     }
     values: dict[str, Any] = defaultdict(lambda: "-")
     for key, value in facts.items():
-        values[key] = format_number(value) if isinstance(value, float) else value
+        values[key] = write_number(value) if isinstance(value, float) else value
     return [
         (name, shorten(text.format_map(values), 78, placeholder=" …"))
         for name, text in SUMMARY.items()

@@ -10,10 +10,18 @@ import numpy as np
 from ...core.algebra import Array
 from ...core.arguments import check_arguments
 from ...core.units import STANDARD_GRAVITY
-from .histories import canvas, escape_dollars, save, scale
+from .histories import (
+    canvas,
+    draw_curve,
+    escape_dollars,
+    put_legend_above,
+    put_legend_on_top,
+    save,
+    scale,
+)
 
 MARKS = "osv^D"  # of records that are named
-_FRACTILES = (("16 %", "tab:blue", "--"), ("50 %", "black", "-"), ("84 %", "tab:red", "--"))
+_FRACTILES = (("16 %", "tab:blue", ":"), ("50 %", "black", "-"), ("84 %", "tab:red", "--"))
 
 
 @dataclass(frozen=True)
@@ -60,11 +68,7 @@ def plot_ida(
         _draw_panel(axis, panel, factor)
     axes[0].set_ylabel(f"{intensity} [{shown_unit}]")
     axes[0].set_ylim(bottom=0.0)
-    handles, labels = axes[0].get_legend_handles_labels()
-    # keeps room for the legend, which the layout of matplotlib 3.6 does not
-    figure.suptitle(" ", fontsize=20)
-    columns = min(len(labels), 3 * len(demands))
-    figure.legend(handles, labels, loc="upper center", ncol=columns, fontsize=8, frameon=False)
+    put_legend_on_top(figure, *axes[0].get_legend_handles_labels())
     return save(figure, path)
 
 
@@ -96,9 +100,9 @@ def plot_fragility(
     bounds = np.concatenate([brackets for _, brackets in curves.values()])
     x = np.linspace(0.0, 1.2 * np.max(bounds, where=np.isfinite(bounds), initial=0.0), 300)[1:]
     for number, (name, (curve, brackets)) in enumerate(curves.items()):
-        colour = f"C{number}"
         low, value, high = curve(x)
-        axis.plot(factor * x, value, color=colour, label=escape_dollars(name))
+        line = draw_curve(axis, factor * x, value, number, label=escape_dollars(name))
+        colour = line.get_color()
         axis.fill_between(factor * x, low, high, color=colour, alpha=0.15, lw=0.0)
 
         # Brackets from the lowest record to the highest, each at its share of all records.
@@ -109,6 +113,7 @@ def plot_fragility(
             factor * first,
             factor * np.minimum(last, x[-1]),
             color=colour,
+            linestyles=line.get_linestyle(),
             lw=0.8,
             alpha=0.6,
         )
@@ -117,9 +122,9 @@ def plot_fragility(
         ylabel="probability that the limit is passed [-]",
         ylim=(0.0, 1.0),
         xlim=(0.0, factor * x[-1]),
-        title="Fit, its 95 % band, and where each record first passes",
     )
-    axis.legend(fontsize=8, frameon=False, loc="lower right")
+    legend = put_legend_above(axis, 8.0)
+    axis.set_title("Fit, its 95 % band, and where each record first passes", pad=legend + 4.0)
     return save(figure, path)
 
 

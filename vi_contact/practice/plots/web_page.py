@@ -20,7 +20,7 @@ from ...core.errors import InputError, ViContactError
 from ...core.files import describe_os_error, write_output
 from ...core.own_files import read_bytes
 from .charts import Chart
-from .histories import STYLE, require_matplotlib
+from .histories import STYLE, choose_look, require_matplotlib
 from .maps import Drawing
 from .sections import Section
 
@@ -30,6 +30,18 @@ FEWEST = 400  # of a curve
 MOST = 12_000  # of a curve
 SHOWN = 4  # curves of a chart; the others when their names are clicked
 ENERGIES = 10  # likewise of the chart of energies: all of them
+# Dashes and markers of ``Look`` -> what Plotly calls them.
+DASHES = {"solid": "solid", "dashed": "dash", "dashdot": "dashdot", "dotted": "dot"}
+SYMBOLS = {
+    "": "",
+    "o": "circle-open",
+    "s": "square-open",
+    "^": "triangle-up-open",
+    "x": "x-thin-open",
+    "D": "diamond-open",
+    "v": "triangle-down-open",
+    "+": "cross-thin-open",
+}
 MISSING = (
     'a report for browsers needs jinja2 and plotly: give pip install "vi-contact[report]", or bash '
     "install/report.sh in a clone, or name the report .pdf"
@@ -152,15 +164,19 @@ def find_extremes(values: Array, most: int) -> Indices:
 def _encode_chart(chart: Chart, most: int) -> Mapping[str, Any]:
     """Return what the script draws, with at most so many points of each line."""
     lines = []
+    places = chart.places
     for line in chart.lines:
         rows = find_extremes(line.y, most)
+        look = choose_look(places[line.name])
         lines.append(
             {
                 "name": line.name,
                 "x": _round_numbers(line.x[rows], 7),
                 "y": _round_numbers(line.y[rows], 5),
                 "pale": line.pale,
-                "dash": line.style == ":",
+                "colour": look.colour,
+                "dash": DASHES[look.dash],
+                "symbol": SYMBOLS[look.marker],
                 "dots": line.style == ".",
             }
         )

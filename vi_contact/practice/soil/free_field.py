@@ -131,7 +131,7 @@ class FreeFieldSide:
         compliant = self._ground.lets_waves_in
         if not compliant and held_components < 2:
             raise InputError(
-                f"the lowest node of free-field side '{name}' is not held: clamp or prescribe the "
+                f"the lowest node of free-field side '{name}' is not held: fix or prescribe the "
                 "base, or give the side its CompliantBase"
             )
         if compliant and held_components:

@@ -4,6 +4,7 @@ from .ida.fragility import fragility_curve as fragility_curve
 from .ida.ida import IDA as IDA
 from .ida.ida import run_ida as run_ida
 from .ida.runs import record_set as record_set
+from .profiles import profile as profile
 from .refinement import refine as refine
 from .report import comparisons as comparisons
 from .report import report as report

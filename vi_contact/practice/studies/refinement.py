@@ -1,4 +1,4 @@
-"""Repeat a run with half the element size and with half the time step.
+"""Repeat a run with half the element size or with half the time step.
 
 The peaks are set beside each other.
 """
@@ -11,13 +11,15 @@ import numpy as np
 
 from ...beam import Elements
 from ...core.arguments import check_type
-from ...core.checks import quote
+from ...core.checks import check_word, quote, several
 from ...core.errors import InputError, ViContactError
 from ...core.own_files import inner_folder, is_own
-from ...run.files.folder import CHECKPOINT, HISTORY_CSV
-from ...run.files.reading import RunFolder, read_run
+from ...run.files.folder import CHECKPOINT, HISTORY_CSV, MODEL
+from ...run.files.reading import RunFolder, read_object, read_run
 from ..engineering.peak_values import GROWS, peaks
-from ..plots.sections import SAY, Section, Table, format_number
+from ..plots.report_numbers import ReportNumbers
+from ..plots.sections import NOISE, SAY, Section, Table
+from ..units.report_units import write_number
 from .cases.library import COPY, read_copy, read_settings
 from .cases.toml_file import format_value, with_settings
 
@@ -25,11 +27,18 @@ FOLDER = "refined"  # in the run folder
 NAMES = {"h": "h/2", "dt": "dt/2"}
 # columns without a size that mesh and step should leave
 UNSIZED = ("certificate", "energy_defect", "contact_active")
-NOISE = 1e-6  # of the largest peak in the same unit: columns that small are not compared
+IN_WORDS = {"h": "half the element size (h/2)", "dt": "half the time step (dt/2)"}
+# What a refined run may differ in: what a report says beside the mechanics.
+BESIDE = ("sheet", "check", "title")
 
 
 def refine(
-    folder: str | Path, comm: Any, *, allow: Sequence[str] = (), progress: bool = True
+    folder: str | Path,
+    comm: Any,
+    *,
+    names: Sequence[str] = ("h", "dt"),
+    allow: Sequence[str] = (),
+    progress: bool = True,
 ) -> dict[str, str]:
     """Run the case of a finished run folder with h/2 and with dt/2, into refined/h and refined/dt.
 
@@ -38,6 +47,7 @@ def refine(
     Args:
         folder: of the run.
         comm: the ranks.
+        names: what is halved, "h", "dt" or both.
         allow: as of ``read_case``.
         progress: whether to print a progress line.
 
@@ -48,6 +58,19 @@ def refine(
         InputError: for a folder without case file or whose run has not finished.
     """
     check_type("refine", "folder", folder, str | Path)
+    run = _read_finished(folder)
+    failed = {}
+    for name in several("refine", "names", names, 'give "h", "dt" or both, as a list'):
+        check_word("refined run", name, tuple(NAMES))
+        try:
+            _run_refined(run, name, comm, allow, progress)
+        except ViContactError as error:
+            failed[name] = str(error)
+    return failed
+
+
+def _read_finished(folder: str | Path) -> RunFolder:
+    """Return the run of a folder; InputError for one that cannot be refined."""
     run = read_run(folder)
     if not is_own(run.folder / COPY):
         raise InputError(
@@ -58,13 +81,72 @@ def refine(
         raise InputError(
             f"the run in '{folder}' has not finished: continue it with --restart, then refine it"
         )
-    failed = {}
-    for name in NAMES:
-        try:
-            _run_refined(run, name, comm, allow, progress)
-        except ViContactError as error:
-            failed[name] = str(error)
-    return failed
+    return run
+
+
+def estimate_cost(folder: str | Path, names: Sequence[str]) -> str:
+    """Say how long the refined runs will take that are not there yet, from the time of the run.
+
+    Half the elements in each of d directions are 2^d times as many, which is the least that their
+    run takes.
+
+    Args:
+        folder: of the run.
+        names: what is halved, as of ``refine``.
+
+    Raises:
+        InputError: as of ``refine``.
+    """
+    run = _read_finished(folder)
+    seconds = _read_seconds(run)
+    phrases = []
+    for name in names:
+        if _find_refined(run, name) is not None:
+            phrases.append(f"{NAMES[name]} has run already")
+        elif seconds is not None:
+            times = 2.0 if name == "dt" else 2.0 ** _read_dimension(run)
+            least = "about" if name == "dt" else "at least"
+            phrases.append(f"{NAMES[name]} will take {least} {write_seconds(times * seconds)}")
+        else:
+            phrases.append(f"how long {NAMES[name]} will take is unknown")
+    took = "" if seconds is None else f"the run took {write_seconds(seconds)}; "
+    return took + ", ".join(phrases)
+
+
+def _read_seconds(run: RunFolder) -> float | None:
+    """Return how long a run took [s]; None where nothing tells it.
+
+    The seconds of a run that was continued are those since then: its steps took longer.
+    """
+    seconds: Any = run.facts.get("seconds")
+    per_step: Any = run.facts.get("seconds_per_step")
+    steps: Any = run.facts.get("steps")
+    if not _is_number(seconds):
+        return None
+    marched = per_step * steps if _is_number(per_step) and _is_number(steps) else 0.0
+    return float(max(seconds, marched))
+
+
+def _is_number(value: Any) -> bool:
+    """Tell whether an entry of summary.json is a number."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def write_seconds(seconds: float) -> str:
+    """Write a time for people, in seconds, minutes or hours."""
+    if seconds < 120.0:
+        return f"{write_number(seconds, 2)} s"
+    if seconds < 7200.0:
+        return f"{write_number(seconds / 60.0, 2)} min"
+    return f"{write_number(seconds / 3600.0, 2)} h"
+
+
+def _read_dimension(run: RunFolder) -> int:
+    """Return the dimension of the model of a run; that of the plane where nothing tells it."""
+    if not is_own(run.folder / MODEL):
+        return 2
+    dimension = read_object(run.folder / MODEL).get("dimension")
+    return dimension if dimension in (1, 2, 3) else 2
 
 
 def _run_refined(
@@ -86,7 +168,11 @@ def _run_refined(
 def _is_of_same_case(run: RunFolder, name: str) -> bool:
     """Tell whether the refined run is of the case that the run folder holds."""
     wanted = with_settings(read_copy(run.folder), list(_halve(run, name)))
-    return read_copy(inner_folder(run.folder, FOLDER, name)) == wanted
+    there = read_copy(inner_folder(run.folder, FOLDER, name))
+    for beside in BESIDE:
+        wanted.pop(beside, None)
+        there.pop(beside, None)
+    return there == wanted
 
 
 def _halve(folder: RunFolder, name: str) -> Iterator[str]:
@@ -158,19 +244,50 @@ def _read_status(folder: Path) -> str:
     return str(read_run(folder).facts.get("status")) if is_own(folder / HISTORY_CSV) else ""
 
 
-def describe_refinement(run: RunFolder, failed: Mapping[str, str]) -> Section:
-    """Return the section with the peaks of a run and of those in its folder ``refined``.
+def _find_refined(run: RunFolder, name: str) -> Path | None:
+    """Return the folder of a refined run of the same case that has finished; None without."""
+    if not is_own(run.folder / COPY):
+        return None
+    out = inner_folder(run.folder, FOLDER, name)
+    return out if _read_status(out) == "finished" and _is_of_same_case(run, name) else None
 
-    It says so if there are none; ``failed`` is name -> why, of ``refine``.
+
+def read_refined(run: RunFolder, failed: Mapping[str, str]) -> dict[str, RunFolder]:
+    """Return "h" or "dt" -> the refined run in the folder ``refined`` of a run.
+
+    Those of another case, and those that have not finished, are left out.
+
+    Args:
+        run: whose folder it is.
+        failed: what ``refine`` returned.
     """
-    refined: dict[str, dict[str, Any]] = {}
+    refined = {}
     for name in NAMES:
         if name in failed:  # its folder may be none
             continue
-        out = inner_folder(run.folder, FOLDER, name)
-        if _read_status(out) == "finished" and _is_of_same_case(run, name):
-            other = read_run(out)
-            refined[name] = {peak.name: peak for peak in peaks(other.history, other.columns)}
+        out = _find_refined(run, name)
+        if out is not None:
+            refined[name] = read_run(out)
+    return refined
+
+
+def describe_refinement(
+    run: RunFolder, failed: Mapping[str, str], numbers: ReportNumbers | None = None
+) -> Section:
+    """Return the section with the peaks of a run and of those in its folder ``refined``.
+
+    It says so if there are none.
+
+    Args:
+        run: what ``read_run`` returned.
+        failed: name -> why, of ``refine``.
+        numbers: writes them; None: in the usual units.
+    """
+    numbers = numbers or ReportNumbers()
+    refined = {
+        name: {peak.name: peak for peak in peaks(other.history, other.columns)}
+        for name, other in read_refined(run, failed).items()
+    }
     sentences = [f"The run with {NAMES[name]} failed: {why}." for name, why in failed.items()]
     if not refined:
         return Section("Discretisation error", [*sentences, SAY["untried"]])
@@ -183,25 +300,33 @@ def describe_refinement(run: RunFolder, failed: Mapping[str, str]) -> Section:
     for peak in sized:
         largest = max(_measure(other) for other in sized if other.unit == peak.unit)
         if _measure(peak) > NOISE * largest:
-            rows.append(_compare(peak, refined))
+            rows.append(_compare(peak, refined, numbers))
     table = Table(header, rows, sortable=True)
-    return Section("Discretisation error", [SAY["refined"], *sentences], [table])
+    finer = " and with ".join(IN_WORDS[name] for name in refined)
+    return Section(
+        "Discretisation error", [SAY["refined"].format(finer=finer), *sentences], [table]
+    )
 
 
-def _compare(peak: Any, refined: Mapping[str, Mapping[str, Any]]) -> list[str]:
+def _compare(
+    peak: Any, refined: Mapping[str, Mapping[str, Any]], numbers: ReportNumbers
+) -> list[str]:
     """Return the row of a peak: its size, and those of the refined runs with the difference in %.
 
     Args:
         peak: of the run.
         refined: name of a refined run -> column -> its peak.
+        numbers: writes them.
     """
     size = _measure(peak)
     mark = ", raw: not convergent at impacts" if peak.quantity.endswith(GROWS) else ""
-    row = [peak.name + mark, peak.unit, format_number(size)]
+    factor, unit = numbers.choose_unit(peak.name, peak.unit)
+    row = [peak.name + mark, unit, write_number(factor * size)]
     for others in refined.values():
         other = _measure(others[peak.name]) if peak.name in others else np.nan
         # adding zero makes -0 a zero
-        row += [format_number(other), f"{round(100.0 * (other / size - 1.0), 2) + 0.0:+g} %"]
+        change = round(100.0 * (other / size - 1.0), 2) + 0.0
+        row += [write_number(factor * other), f"{change:+g} %"]
     return row
 
 

@@ -39,7 +39,14 @@ from .stored_rows import StoredArrays, StoredRows, pack_records, read_blocks, wr
 from .table import Block, Table
 
 # of contact points, units
-GEOMETRY = {"points": "m", "normals": "-", "weights": "m²", "gap0": "m", "bilateral": "-"}
+GEOMETRY = {
+    "points": "m",
+    "normals": "-",
+    "weights": "m²",
+    "gap0": "m",
+    "bilateral": "-",
+    "uncovered": "-",
+}
 PUSH = 1.0  # seconds after which rows are pushed onto the medium again
 SAVE = 10.0  # seconds after which history.h5 is rewritten again
 # history.h5 is rewritten when it has grown by this factor: what is written stays in proportion

@@ -48,13 +48,17 @@ _KINDS: dict[str, type | tuple[type, ...]] = {  # of the entries of summary.json
 
 @dataclass(frozen=True)
 class ContactGeometry:
-    """Hold contact points as group ``contact`` of history.h5 has them: see ``ContactSurface``."""
+    """Hold contact points as group ``contact`` of history.h5 has them: see ``ContactSurface``.
+
+    ``uncovered`` is None in runs before 0.3, which do not tell.
+    """
 
     points: Array
     normals: Array
     weights: Array
     gap0: Array
     bilateral: Mask
+    uncovered: Mask | None = None
 
 
 @dataclass(frozen=True)
@@ -276,11 +280,14 @@ def _read_arrays(
             weights=group["weights"][()],
             gap0=group["gap0"][()],
             bilateral=group["bilateral"][()],
+            uncovered=group["uncovered"][()].astype(bool) if "uncovered" in group else None,
         )
 
         # What is damaged may have any shapes: one number, or one vector, for each point.
         count = len(geometry.weights)
-        numbers = (geometry.weights, geometry.gap0, geometry.bilateral)
+        numbers = [geometry.weights, geometry.gap0, geometry.bilateral]
+        if geometry.uncovered is not None:
+            numbers.append(geometry.uncovered)
         vectors = np.shape(geometry.points)
         fit = all(np.shape(values) == (count,) for values in numbers)
         fit = fit and len(vectors) == 2 and vectors[0] == count

@@ -117,7 +117,10 @@ class Writer:
 
         # Log and histories, on rank 0, with the contact points of all ranks.
         surface = self._problem.surface
-        geometry = {name: surface.on_first(getattr(surface, name)) for name in GEOMETRY}
+        values = {name: getattr(surface, name) for name in GEOMETRY}
+        if surface.uncovered is None:
+            values["uncovered"] = np.zeros(surface.count, dtype=bool)
+        geometry = {name: surface.on_first(array) for name, array in values.items()}
         on_root(self._comm, partial(self._make, folder, geometry))
 
         # Fields, on all ranks; of a run that goes on in its folder earlier frames stay.

@@ -15,7 +15,7 @@ from .columns import expand_axes
 
 # Column -> (unit, meaning). One with {axis} in its name is recorded once for each axis.
 _CONTACT_COLUMNS: Columns = {
-    "contact_uplift": ("-", "uplift ratio: share of the contact surface, by weight, that is open"),
+    "contact_uplift": ("-", "open share of the contact surface, by weight"),
     "contact_active": ("-", "number of closed contact points"),
     "contact_resultant": ("N", "sum of the normal reactions Σ r_n"),
     "contact_force_{axis}": ("N", "contact force on the body along {axis}, -Σ r_n n_{axis}"),
@@ -30,7 +30,7 @@ _FRICTION_COLUMNS: Columns = {
     "friction_force_{axis}": ("N", "friction force on the body along {axis}"),
     "contact_max_slip": (
         "m",
-        "largest tangential displacement on the support; nan without contact points",
+        "largest tangential displacement along the ground; nan without contact points",
     ),
     "friction_used": (
         "-",

@@ -27,8 +27,9 @@ what a report asks of a part:
     margin = 1 - |T| / sum limit(r_n)    (mu N - |T| over mu N)
 
 h is the height of the thrust above the lowest point of the part, H the height of the part;
-pressure_low and pressure_high are r_n / weight at its two ends, of the heel and the toe of a wall's
-base.
+pressure_low and pressure_high are r_n / weight at its two ends, which are toe and heel of a wall's
+base. Points that are hardly covered by the other side have no pressure (``uncovered``): the ends
+are then the covered points next to them.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -82,6 +83,8 @@ class Part:
         whole: sum of the weights of the whole part [m²].
         lowest: height of the lowest point above the centre [m]; nan where the part has no height.
         tall: height of the part [m].
+        axis: along which the part is longest.
+        span: coordinates of its two ends along this axis [m].
         mask: (m,) which conditions of this rank are in the part.
         weights: (k,) areas of the points [m²].
         normals: (k, d) their contact directions.
@@ -153,7 +156,12 @@ class Part:
         numbers = np.unique(points, axis=0, return_inverse=True)[1].ravel()
         self.tangents = make_tangent_vectors(normals, getattr(geometry, "nodes", numbers))[chosen]
         self.fit = self._fit_motion().T
-        self.ends = self._average_ends(places).T
+        uncovered = getattr(geometry, "uncovered", None)
+        covered = np.ones(len(places), dtype=bool) if uncovered is None else ~uncovered[chosen]
+        self.axis = int(np.argmax(np.ptp(places, axis=0)))
+        along = places[:, self.axis]
+        self.span = (float(along.min()), float(along.max()))
+        self.ends = self._average_ends(along, covered).T
 
         # Of all this only the rows of one rank stay.
         slots = np.arange(len(points)) if slots is None else slots
@@ -174,18 +182,21 @@ class Part:
             )
         return np.asarray(direction / size)
 
-    def _average_ends(self, places: Array) -> Array:
+    def _average_ends(self, along: Array, covered: Mask) -> Array:
         """Return rows (2, k) that make of r_n the pressures at the low and the high end.
 
         The ends are those along the longest axis; the pressure there is the sum of r_n over the sum
         of the weights.
 
         Args:
-            places: of the points (k, d) [m].
+            along: coordinates of the points along this axis (k,) [m].
+            covered: (k,) which points have a pressure; all count where none has.
         """
-        along = places[:, np.argmax(np.ptp(places, axis=0))]
+        counts = covered if covered.any() else ~covered
         slack = DETERMINED * np.ptp(along)
-        ends = np.stack([along <= along.min() + slack, along >= along.max() - slack])
+        low = along[counts].min() + slack
+        high = along[counts].max() - slack
+        ends = np.stack([counts & (along <= low), counts & (along >= high)])
         return np.asarray(ends / (ends @ self.weights)[:, None])
 
     def _fit_motion(self) -> Array:

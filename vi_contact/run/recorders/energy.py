@@ -33,7 +33,7 @@ class Energy:
         "energy_strain": ("J", "strain energy ½ uᵀKu"),
         "work_input": ("J", "work of loads, ground motion and prescribed motions since the start"),
         "loss_damping": ("J", "work of viscous damping since the start"),
-        "loss_contact": ("J", "work done on the support by the contact reactions since the start"),
+        "loss_contact": ("J", "work done on the ground by the contact reactions since the start"),
         "loss_friction": ("J", "work of friction since the start"),
         "loss_impact": ("J", "kinetic energy taken by the impact law since the start, signed"),
         "loss_algorithmic": ("J", "numerical dissipation of the time scheme since the start"),

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ...core.algebra import Array, Indices
-from ...core.checks import array, column_name, describe_point, flag, instance
+from ...core.checks import array, column_name, describe_point, flag, instance, optional, provides
 from ...core.errors import InputError
 from ...core.problem import ContactProblem
 from ...core.quantities import Unit
@@ -69,6 +69,10 @@ class Probe:
     ``nearest``: take the nearest node of every point; the log and the meaning of the columns tell
     its distance, as ``distances`` does after ``start``: label -> [m].
 
+    ``cells``: the cell group (``fem.Cells``) that points are of: where two bodies touch, a point is
+    at a node of both. None for the whole mesh; of several nodes at a place the one of least number
+    counts then.
+
     InputError if a label has other characters than letters, digits and underscores, or a point is
     outside the body.
     """
@@ -77,11 +81,14 @@ class Probe:
     velocity: bool = False
     acceleration: bool = False
     nearest: bool = False
+    cells: Any = None
 
     def __post_init__(self) -> None:
         instance("Probe", "points", self.points, Mapping, "give labels and points, {'top': (x, y)}")
         for name in ("velocity", "acceleration", "nearest"):
             flag("Probe", name, getattr(self, name))
+        remedy = "give a cell group, such as tags['soil'], or leave it out"
+        optional(provides, "Probe", "cells", self.cells, ("indices",), remedy)
         if not self.points:
             raise InputError(
                 "Probe: points is empty; give labels and points, {'top': (x, y)}, or leave it out"
@@ -148,18 +155,27 @@ class Probe:
         if not hasattr(space, "find_nearest"):  # of a user's own: where its nodes are is not known
             return Places.at_nodes(space.find_nodes(points))
         in_cells = hasattr(space, "find_in_cells") and not self.nearest
-        nodes, distances = space.find_nearest(points, anywhere=in_cells)
+        chosen = None
+        among = None
+        if self.cells is not None:
+            remedy = "leave cells out where bodies have no mesh"
+            provides("Probe", "the system's space", space, ("find_nodes_of_cells",), remedy)
+            chosen = self.cells.indices
+            among = space.find_nodes_of_cells(chosen)
+        nodes, distances = space.find_nearest(points, anywhere=True, among=among)
         distances[distances <= SAME * space.size] = 0.0
         away = np.flatnonzero(distances)
-        if not in_cells or not len(away):
-            return Places.at_nodes(nodes, distances)
 
         # Points that are at no node are in a cell, or so near to the body that a node is meant:
-        # ``find_nodes`` refuses others.
-        cells = space.find_in_cells(points[away])
+        # others are refused.
+        cells: list[tuple[Indices, Array] | None] = [None] * len(away)
+        if in_cells and len(away):
+            cells = space.find_in_cells(points[away], chosen)
         for k, cell in zip(away, cells, strict=True):
             if cell is None:
-                space.find_nodes(points[k][None])
+                self._refuse_outside(space, k, points[k], among)
+        if not in_cells or not len(away):
+            return Places.at_nodes(nodes, distances)
 
         # Rows of equal length: those of points at a node are filled up with weights of zero.
         width = max((len(cell[0]) for cell in cells if cell is not None), default=1)
@@ -171,6 +187,21 @@ class Probe:
                 table[k], weights[k] = cell
                 distances[k] = 0.0
         return Places(table, weights, distances)
+
+    def _refuse_outside(self, space: Any, number: int, point: Array, among: Indices | None) -> None:
+        """Raise InputError for a point that is not of the body, with its label. Collective.
+
+        Args:
+            space: of the body.
+            number: of the point.
+            point: (d,) [m].
+            among: as of ``find_nearest``.
+        """
+        try:
+            space.find_nearest(point[None], among=among)
+        except InputError as error:
+            label = list(self.points)[number]
+            raise InputError(f"Probe: points['{label}']: {error}, or leave it out") from None
 
     def _tell_distances(self, problem: ContactProblem) -> None:
         """Say on rank 0 how far the nodes are that points take their values from."""

@@ -17,9 +17,9 @@ from .contact_parts import DETERMINED, Part, Where, check_part
 
 # Quantity -> (unit, meaning).
 _MEANING: Columns = {
-    "uplift": ("-", "uplift ratio 1 - L_contact/L"),
+    "uplift": ("-", "open share 1 - L_contact/L"),
     "opening": ("m", "largest gap"),
-    "slip": ("m", "largest tangential displacement on the support"),
+    "slip": ("m", "largest tangential displacement along the ground"),
     "force": ("N", "contact force on the body"),
     "N": ("N", "normal force -F·n, compression positive"),
     "T": ("N", "tangential force F·t on the body"),
@@ -33,12 +33,12 @@ _MEANING: Columns = {
             "determine it"
         ),
     ),
-    "settlement": ("m", "mean displacement towards the support"),
+    "settlement": ("m", "mean displacement towards the ground"),
     "level": (
         "-",
         ("height of the thrust above the lowest point over the height of the part; nan while open"),
     ),
-    "sliding": ("m", "mean tangential displacement on the support; in space its size"),
+    "sliding": ("m", "mean tangential displacement along the ground; in space its size"),
     "margin": ("-", "share of the friction that is left, 1 - |T|/limit; nan while open"),
     "pressure_low": ("Pa", "contact pressure at the end where the longest coordinate is least"),
     "pressure_high": ("Pa", "contact pressure at the end where the longest coordinate is largest"),
@@ -71,9 +71,13 @@ class Resultants:
         part: a boundary group, fem.Facets, or two opposite corners of a box, which has its faces
             too: a node belongs wholly, with all its force and weight, to each part that it is in.
             The whole surface when ``part`` and ``where`` are None.
+        toe: a point (d,) [m] at or beyond the end of the part over which its body would tip; the
+            other end is the heel. The meanings of pressure_low and pressure_high then say which of
+            them is at the toe.
 
     Reactions are those of the step (mean or end value, as the scheme says), on a unilateral and on
-    a held support. InputError for both part and where, and for a part of no contact points.
+    a held support. InputError for both part and where, for a part of no contact points, and for a
+    toe that is as near to one end as to the other.
     """
 
     name: str = ""
@@ -81,6 +85,7 @@ class Resultants:
     where: Where | None = None
     normal: Sequence[float] | None = None
     part: Any = None
+    toe: Annotated[Sequence[float] | None, Unit("m")] = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):
@@ -94,6 +99,7 @@ class Resultants:
             optional(
                 array, f"part '{self.name}'", "part, a box,", self.part, (2, None), unit="metres"
             )
+        optional(array, f"part '{self.name}'", "the toe", self.toe, (None,), unit="metres")
 
     def columns(self) -> Columns:
         """Call ``start`` first."""
@@ -104,6 +110,8 @@ class Resultants:
             if quantity not in _MEANING:  # a component, such as force_x
                 kind, _, axis = quantity.partition("_")
             unit, text = _MEANING[kind]
+            if quantity in self._ends:
+                text = f"contact pressure at the {self._ends[quantity]}"
             if axis:
                 text = f"{text} along {axis}"
             columns[f"{quantity}_{self.name}"] = (unit, f"{text}, part {self.name}")
@@ -129,7 +137,22 @@ class Resultants:
         whole = problem.surface.whole()
         where = self.where if self.part is None else self._make_where(whole)
         self._part = Part(self.name, whole, self.centre, where, self.normal, problem.surface.slots)
+        self._ends = {} if self.toe is None else self._name_ends(self.toe)
         return self._row(state)
+
+    def _name_ends(self, toe: Sequence[float]) -> dict[str, str]:
+        """Return pressure_low and pressure_high -> "toe" or "heel"."""
+        part = self._part
+        owner = f"part '{self.name}'"
+        place = array(owner, "the toe", toe, (part.dimension,), unit="metres")[part.axis]
+        low, high = part.span
+        if abs(abs(place - low) - abs(place - high)) <= DETERMINED * (high - low):
+            raise InputError(
+                f"{owner}: its toe is as near to one end as to the other: give a point at or "
+                "beyond one end"
+            )
+        names = ("toe", "heel") if abs(place - low) < abs(place - high) else ("heel", "toe")
+        return dict(zip(("pressure_low", "pressure_high"), names, strict=True))
 
     def _make_where(self, whole: ContactSurface) -> Where:
         """Return what picks the conditions of ``part`` out of all. Collective."""

@@ -9,16 +9,23 @@ these are to be met by such a run.
 
 import math
 from abc import abstractmethod
-from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from dataclasses import dataclass, replace
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from ....core.algebra import Array
 from ....core.quantities import RATIO, Between, Positive, Unit
-from .comparison import Formula, History, Length, Numbers, Poisson
-from .earth_pressure_static import WALL_ANSWERS, WALL_COLUMNS, CoulombWedge, EarthPressure
+from .comparison import NO_JUDGEMENT, Formula, History, Length, Numbers, Poisson
+from .earth_pressure_static import (
+    WALL_ANSWERS,
+    WALL_COLUMNS,
+    YIELDED,
+    CoulombWedge,
+    EarthPressure,
+)
+from .model_facts import ModelFacts, tell_contradiction
 
 # CHOSEN: share of the layer's lowest frequency below which inertia adds less than 5 %, by the
 # factor 1/sqrt(1 - 0.3²) of an oscillator.
@@ -65,8 +72,11 @@ class MononobeOkabe(CoulombWedge):
     The thrust acts at H/3 in this theory, which applies as that of Coulomb's wedge does.
 
     Attributes:
-        kh: acceleration towards the wall, over that of gravity.
+        kh: acceleration towards the wall, over that of gravity; None: the peak of the run, the
+            largest size of ``acceleration`` over g.
         kv: acceleration upwards, likewise.
+        acceleration: column of the ground's acceleration; of a run whose base moves by itself that
+            of a point of the free field.
     """
 
     formula: ClassVar[Formula] = Formula(
@@ -82,27 +92,49 @@ class MononobeOkabe(CoulombWedge):
         fields=(*CoulombWedge.formula.fields, "kh", "kv"),
         reads=WALL_COLUMNS,
         answers=WALL_ANSWERS,
+        reading=YIELDED,
     )
     largest: ClassVar[bool] = True
 
-    kh: Annotated[float, Between(0.0, 10.0), RATIO]
+    kh: Annotated[float, Between(0.0, 10.0), RATIO] | None = None
     kv: Annotated[float, Between(-0.9, 0.9), RATIO] = 0.0
+    acceleration: str = "a_g_x"
+
+    def settle(self, history: History, facts: ModelFacts) -> tuple[Self, list[str]]:
+        """Return the check with kh and the friction of the wall, and sentences about them."""
+        check, notes = super().settle(history, facts)
+        shaken = history.get(self.acceleration, np.zeros(0))
+        peak = float(np.abs(shaken).max(initial=0.0)) / self.gravity
+        source = f"the peak of {self.acceleration} over g"
+        if self.kh is not None:
+            contradiction = tell_contradiction("kh", self.kh, peak, "", source) if peak else []
+            return check, notes + contradiction
+        if not peak:
+            return check, notes
+        return replace(check, kh=peak), [*notes, f"kh is that of the run: {source}"]
 
     def coefficient(self, psi: float = 0.0) -> tuple[float, str]:
         """Return K (1 - kv), and why it does not apply, or "".
 
         The earthquake turns gravity further than psi [rad].
         """
+        if self.kh is None:
+            why = f"{self.acceleration} is zero or not recorded: name the ground's acceleration"
+            return math.nan, f"{why} by acceleration=, or give kh"
         K, why = super().coefficient(psi + math.atan(self.kh / (1.0 - self.kv)))
         return K * (1.0 - self.kv), why
 
 
+ELASTIC = (
+    f"{NO_JUDGEMENT}: the theory is that of elastic soil, and below 1 the run adds less than it, "
+    "which is unsafe for a wall that does not give way"
+)
 LAYER_COLUMNS = ("t", "N_{part}", "height_{part}", "uplift_{part}", "{acceleration}")
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Layer(EarthPressure):
-    """Compare the largest thrust that is added to the first row's, or the height of the addition.
+class LayerCheck(EarthPressure):
+    """Compare the largest thrust that is added to the first row's, its moment, or its height.
 
     Attributes:
         nu: Poisson's ratio of the layer.
@@ -138,18 +170,22 @@ class _Layer(EarthPressure):
         added_thrust = float(thrust[row] - thrust[0])
         if len(push) < 3 or peak <= 0.0 or added_thrust <= 0.0:
             why = f"{self.acceleration} never presses the soil on the wall: check sign and side"
-            return math.nan, added_thrust, why, {}
+            return Numbers(math.nan, added_thrust / self.width, why)
         expected, arm, why = self.find_added_thrust(history["t"], push)
         if not why and open_share > LIFTED:
             why = f"up to {open_share:.0%} of the wall leaves the soil"
         inputs = {"a": (peak, "m/s²")}
+        added = (thrust - thrust[0]) / self.width
+        added_moment = float(moment[row] - moment[0]) / self.width
         if self.of == "height":
-            return arm, float(moment[row] - moment[0]) / added_thrust, why, inputs
-        return expected, added_thrust / self.width, why, inputs
+            return Numbers(arm, added_moment / float(added[row]), why, inputs)
+        if self.of == "moment":
+            return Numbers(expected * arm, added_moment, why, inputs, added)
+        return Numbers(expected, float(added[row]), why, inputs, added)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wood(_Layer):
+class Wood(LayerCheck):
     """Expect the added thrust of a slow motion on a smooth wall, exact in plane strain.
 
     It applies below 0.3 of the layer's lowest frequency, c_s/(4 H); that of a motion is max a/(pi
@@ -170,6 +206,7 @@ class Wood(_Layer):
         fields=("height", "rho", "nu", "c_s", "length"),
         reads=LAYER_COLUMNS,
         answers=WALL_ANSWERS,
+        reading=ELASTIC,
     )
 
     length: Length | None = None
@@ -184,18 +221,22 @@ class Wood(_Layer):
         # the layer.
         speed = 0.5 * float(np.ptp(cumulative_trapezoid(push, t, initial=0.0)))
         lowest = 0.25 * self.c_s / self.height
-        frequency = float(np.abs(push).max()) / (2.0 * math.pi * speed)
         why = ""
-        if frequency > SLOW * lowest:
-            why = (
-                f"the motion has {frequency:.3g} Hz, above {SLOW:g} of the layer's {lowest:.3g} Hz"
-            )
+        if speed == 0.0:
+            why = "the motion turns round in every row: its steps are too long to be a slow motion"
+        else:
+            frequency = float(np.abs(push).max()) / (2.0 * math.pi * speed)
+            if frequency > SLOW * lowest:
+                why = (
+                    f"the motion has {frequency:.3g} Hz, above {SLOW:g} of the layer's "
+                    f"{lowest:.3g} Hz"
+                )
         thrust = factor * self.rho * push.max() * self.height**2
         return thrust, arm * self.height, why
 
 
 @dataclass(frozen=True, kw_only=True)
-class VeletsosYounan(_Layer):
+class VeletsosYounan(LayerCheck):
     """Expect the added thrust under the whole motion.
 
     The theory leaves vertical stresses out; under slow motions it gives 3 to 6 % more than
@@ -215,6 +256,7 @@ class VeletsosYounan(_Layer):
         fields=("height", "rho", "nu", "c_s", "damping"),
         reads=LAYER_COLUMNS,
         answers=WALL_ANSWERS,
+        reading=ELASTIC,
     )
 
     damping: Annotated[float, Positive, RATIO] = 0.05

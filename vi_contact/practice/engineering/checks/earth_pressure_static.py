@@ -9,15 +9,18 @@ active and passive ones are bounds beside it.
 """
 
 import math
-from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from dataclasses import dataclass, replace
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 
+from ....core.algebra import Array
 from ....core.quantities import NotNegative, Unit
 from ....core.units import STANDARD_GRAVITY
 from .comparison import (
+    NO_JUDGEMENT,
     Check,
+    Comparison,
     Density,
     Formula,
     Friction,
@@ -28,6 +31,7 @@ from .comparison import (
     Numbers,
     Poisson,
 )
+from .model_facts import SLACK, ModelFacts, tell_contradiction
 
 
 def wedge(
@@ -70,7 +74,15 @@ def wedge(
 
 WALL_FIELDS = ("height", "rho", "surcharge", "gravity", "width")
 WALL_COLUMNS = ("N_{part}", "height_{part}")
-WALL_ANSWERS = {"thrust": "N/m", "height": "m"}
+WALL_ANSWERS = {"thrust": "N/m", "moment": "N m/m", "height": "m"}
+YIELDED = (
+    f"{NO_JUDGEMENT}: below 1 the run presses less than yielding soil, which is unsafe; above 1 it "
+    "presses more, as elastic soil does"
+)
+PUSHED_UP = (
+    f"{NO_JUDGEMENT}: above 1 the run presses more than soil bears before it is pushed up, which "
+    "is unsafe"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,8 +94,8 @@ class EarthPressure(Check):
         rho: density of the soil.
         part: of the contact, whose ``Resultants`` with their centre at the foot of the wall record
             N_<part>, height_<part>, uplift_<part>.
-        of: "thrust", N [N/m] per metre of wall, or "height", of its line of action above the foot
-            [m].
+        of: "thrust", N [N/m] per metre of wall; "moment", N times its height above the foot
+            [N m/m]; or "height", of its line of action above the foot [m].
         surcharge: q, on a horizontal metre of ground.
         gravity: g.
         width: of the model across its plane, of a slice its thickness.
@@ -104,26 +116,100 @@ class EarthPressure(Check):
         """Return the K of N, and why it does not apply, or ""."""
         raise NotImplementedError
 
-    def numbers(self, history: History) -> Numbers:
-        """Compare N, or its height.
+    def settle(self, history: History, facts: ModelFacts) -> tuple[Self, list[str]]:
+        """Return the check, and a sentence for a density that no body of the run has."""
+        densities = facts.densities.values()
+        if not densities or any(
+            not tell_contradiction("rho", self.rho, density, "", "") for density in densities
+        ):
+            return self, []
+        texts = ", ".join(f"{name} {density:.4g}" for name, density in facts.densities.items())
+        return self, [f"you gave rho = {self.rho:.4g} kg/m³, the bodies of the run have {texts}"]
+
+    def compare_all(
+        self, history: History, facts: ModelFacts | None = None
+    ) -> tuple[Comparison, ...]:
+        """Return the comparison of the thrust and that of its moment; of one, if one is asked for.
+
+        What both would say is said with the thrust; where the formula does not apply it is all.
+        """
+        first = self.compare(history, facts)
+        if self.of != "thrust" or first.applies:
+            return (first,)
+        second = replace(self, of="moment").compare(history, facts)
+        return first, replace(
+            second, notes=tuple(note for note in second.notes if note not in first.notes)
+        )
+
+    @property
+    def reading(self) -> str:
+        """Return what the ratio means: of passive pressure the other side is unsafe."""
+        return PUSHED_UP if getattr(self, "passive", False) else self.formula.reading
+
+    @property
+    def laden(self) -> float:
+        """Return by what q counts on the ground of a wedge, longer or shorter than its height."""
+        slope = getattr(self, "slope", 0.0)
+        batter = getattr(self, "batter", 0.0)
+        return math.cos(batter) * math.cos(slope) / math.cos(slope - batter)
+
+    def expect(self) -> tuple[float, float, str]:
+        """Return N [N/m], its height above the foot [m], and why the theory does not apply, or "".
 
         The height is that of rho g H²/2 at H/3 and of q H, times ``laden``, at H/2.
         """
         factor, why = self.coefficient()
-        slope = getattr(self, "slope", 0.0)
-        batter = getattr(self, "batter", 0.0)
-
-        # The load on the ground of a wedge, which is longer or shorter than its height.
-        laden = math.cos(batter) * math.cos(slope) / math.cos(slope - batter)
         weight = 0.5 * self.rho * self.gravity * self.height**2
-        load = laden * self.surcharge * self.height
-        thrust = history[f"N_{self.part}"]
+        load = self.laden * self.surcharge * self.height
+        arm = self.height * (weight / 3.0 + load / 2.0) / (weight + load)
+        return factor * (weight + load), arm, why
+
+    def find_pressure(self, heights: Array) -> Array:
+        """Return the normal pressure K (rho g z + q laden) [Pa], z the depth, at heights (n,) [m].
+
+        Heights count from the foot of the wall; above its top there is no pressure.
+        """
+        depth = self.height - heights
+        pressure = self.coefficient()[0] * (
+            self.rho * self.gravity * depth + self.laden * self.surcharge
+        )
+        return np.where(depth >= 0.0, pressure, 0.0)
+
+    def numbers(self, history: History) -> Numbers:
+        """Compare N, its moment about the foot, or its height."""
+        expected, arm, why = self.expect()
+
+        # What the run has: the row of the largest value, or that of rest.
+        thrust = history[f"N_{self.part}"] / self.width
         height = history[f"height_{self.part}"]
-        row = int(np.argmax(thrust)) if self.largest else 0
+        values = thrust * np.nan_to_num(height) if self.of == "moment" else thrust
+        row = int(np.argmax(values)) if self.largest else 0
         if self.of == "height":
-            expected = self.height * (weight / 3.0 + load / 2.0) / (weight + load)
-            return expected, float(height[row]), why, {}
-        return factor * (weight + load), float(thrust[row]) / self.width, why, {}
+            return Numbers(arm, float(height[row]), why)
+        expected *= arm if self.of == "moment" else 1.0
+        found = float(values[row])
+        peak = values if self.largest and found > 0.0 else None
+        notes = () if why else self.judge(found / expected)
+        return Numbers(expected, found, why, peak=peak, notes=notes)
+
+    def judge(self, ratio: float) -> tuple[str, ...]:
+        """Return what a ratio of found to expected says beyond the reading; nothing as a rule."""
+        return ()
+
+
+def judge_active(of: str, ratio: float) -> tuple[str, ...]:
+    """Return a sentence where the run at rest presses less than yielding soil.
+
+    Args:
+        of: "thrust" or "moment".
+        ratio: found over expected.
+    """
+    if ratio >= 1.0 - SLACK:
+        return ()
+    return (
+        f"at rest the {of} of the run is {ratio:.2f} of the active one, so a design by the run is "
+        "unsafe: fill that is one elastic body, placed in one lift, presses too little",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,6 +229,10 @@ class AtRest(EarthPressure):
         fields=(*WALL_FIELDS, "nu"),
         reads=WALL_COLUMNS,
         answers=WALL_ANSWERS,
+        reading=(
+            f"{NO_JUDGEMENT}: below 1 the run presses less than soil at rest, which is unsafe for "
+            "a wall that does not give way"
+        ),
     )
 
     nu: Poisson
@@ -168,6 +258,7 @@ class Rankine(EarthPressure):
         fields=(*WALL_FIELDS, "phi", "slope"),
         reads=WALL_COLUMNS,
         answers=WALL_ANSWERS,
+        reading=YIELDED,
     )
 
     phi: Friction
@@ -185,6 +276,10 @@ class Rankine(EarthPressure):
             why = "the ground is steeper than the friction angle"
         return K, why
 
+    def judge(self, ratio: float) -> tuple[str, ...]:
+        """Tell of a run that presses less than the active pressure."""
+        return () if self.passive else judge_active(self.of, ratio)
+
 
 @dataclass(frozen=True, kw_only=True)
 class CoulombWedge(EarthPressure):
@@ -192,9 +287,10 @@ class CoulombWedge(EarthPressure):
 
     The wedge slides on the wall and on the ground below it.
 
-    phi, delta, slope, batter [rad]; N = P cos(delta). It applies for delta <= phi, passive: delta
-    <= phi/2 (beyond it surfaces that are curved slide at less), ground up to phi, and phi -+ slope
-    - psi >= 0.
+    phi, delta, slope, batter [rad]; N = P cos(delta). A delta of None is that of the run: atan(mu)
+    of the part, no more than the wedge takes, and 0 where the run does not tell mu. The check
+    applies for delta <= phi, passive: delta <= phi/2 (beyond it surfaces that are curved slide at
+    less), ground up to phi, and phi -+ slope - psi >= 0.
     """
 
     formula: ClassVar[Formula] = Formula(
@@ -207,24 +303,51 @@ class CoulombWedge(EarthPressure):
         fields=(*WALL_FIELDS, "phi", "delta", "slope", "batter"),
         reads=WALL_COLUMNS,
         answers=WALL_ANSWERS,
+        reading=YIELDED,
     )
 
     phi: Friction
-    delta: Friction = 0.0
+    delta: Friction | None = None
     slope: Incline = 0.0
     batter: Incline = 0.0
     passive: bool = False
 
+    @property
+    def largest_delta(self) -> float:
+        """Return the largest delta [rad] for which a plane wedge is the worst."""
+        return 0.5 * self.phi if self.passive else self.phi
+
+    def settle(self, history: History, facts: ModelFacts) -> tuple[Self, list[str]]:
+        """Return the check with the friction of the wall, and sentences about it."""
+        _, notes = super().settle(history, facts)
+        mu = facts.find_mu(self.part)
+        angle = 0.0 if mu is None else math.atan(mu)
+        if self.delta is not None:
+            if mu is not None:
+                source = f"atan(mu) of '{self.part}', mu = {mu:.4g}"
+                notes = notes + tell_contradiction("delta", self.delta, angle, " rad", source)
+            return self, notes
+        delta = min(angle, self.largest_delta)
+        if mu:
+            most = f", at most {delta:.4g}" if delta < angle else ""
+            notes = [*notes, f"delta is that of the run: atan(mu) of '{self.part}'{most}"]
+        return replace(self, delta=delta), notes
+
     def coefficient(self, psi: float = 0.0) -> tuple[float, str]:
         """Return K under gravity turned by psi [rad], and why it does not apply, or ""."""
-        largest_delta = 0.5 * self.phi if self.passive else self.phi
+        delta = self.delta or 0.0
+        largest_delta = self.largest_delta
         sign = "+" if self.passive else "-"
-        K = wedge(self.phi, self.delta, self.slope, self.batter, psi=psi, passive=self.passive)
+        K = wedge(self.phi, delta, self.slope, self.batter, psi=psi, passive=self.passive)
         why = ""
         if abs(self.slope) > self.phi:
             why = "the ground is steeper than phi"
         if math.isnan(K):
             why = f"phi {sign} slope - psi is below zero, psi = {psi:.4g}: no wedge is at rest"
-        if self.delta > largest_delta:
+        if delta > largest_delta:
             why = f"delta is above {largest_delta:.4g}: no plane wedge is the worst"
-        return K * math.cos(self.delta), why
+        return K * math.cos(delta), why
+
+    def judge(self, ratio: float) -> tuple[str, ...]:
+        """Tell of a run at rest that presses less than the active pressure."""
+        return () if self.passive or self.largest else judge_active(self.of, ratio)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ....core.algebra import Array
 from ....core.quantities import Positive, Unit
-from .comparison import Check, Formula, History, Length, Numbers, Poisson
+from .comparison import NO_JUDGEMENT, Check, Formula, History, Length, Numbers, Poisson
 
 # ends of Wang's curves
 LARGEST = 10.0  # F
@@ -73,6 +73,10 @@ class RackingRatio(Check):
         fields=("width", "height", "wall", "roof", "invert", "shear_modulus", "nu", "depth"),
         reads=("racking_{box}", "racking_{free}"),
         answers={"": "-"},
+        reading=(
+            f"{NO_JUDGEMENT}: above 1 the box of the run racks more than the formula says, which "
+            "is unsafe for a design by the formula"
+        ),
     )
 
     width: Length
@@ -104,7 +108,7 @@ class RackingRatio(Check):
         if not free:
             why = "the free field does not shear"
         found = box / free if free else float("nan")
-        return racking_ratio(ratio, self.nu), found, why, {"F": (ratio, "-")}
+        return Numbers(racking_ratio(ratio, self.nu), found, why, {"F": (ratio, "-")})
 
 
 def _largest_change(values: Array) -> float:

@@ -5,15 +5,16 @@ Sliding is after Newmark, Géotechnique 15, 1965; rocking is after Housner, Bull
 """
 
 import math
-from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from dataclasses import dataclass, replace
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 
 from ....core.algebra import Array
-from ....core.quantities import RATIO, Between, Positive
+from ....core.quantities import RATIO, Between, Positive, Unit
 from ....core.units import STANDARD_GRAVITY
-from .comparison import Check, Formula, Gravity, History, Incline, Length, Numbers
+from .comparison import NO_JUDGEMENT, Check, Formula, Gravity, History, Incline, Length, Numbers
+from .model_facts import ModelFacts, tell_contradiction
 from .rigid_slip import slide
 
 # CHOSEN: share of alpha below which the first tilt is round-off of a block that stands.
@@ -30,7 +31,8 @@ class NewmarkBlock(Check):
     It applies while the block stays on the plane, and where it stands without motion.
 
     Attributes:
-        mu: friction, or in its place the yield acceleration over g of a level plane.
+        mu: friction, or in its place the yield acceleration over g of a level plane; None: that of
+            the run, see ``settle``.
         slope: angle by which the plane falls towards +x.
         one_sided: whether the block slides to one side only, as a wall before its fill does.
         towards: whose sign is this side along x; 0: down the plane, +x if it is level.
@@ -38,6 +40,9 @@ class NewmarkBlock(Check):
         slip: column of the displacement on the plane, signed.
         acceleration: column of the ground's acceleration along x.
         vertical: column of the ground's acceleration upwards.
+        part: of the contact, on which the block slides; "": that of the column sliding_<part>.
+        weight: of what slides; None: that of ``body``, or else the normal force of the first row.
+        body: name of what slides, among the bodies of the model.
     """
 
     formula: ClassVar[Formula] = Formula(
@@ -50,9 +55,13 @@ class NewmarkBlock(Check):
         fields=("mu", "slope", "towards", "gravity"),
         reads=("t", "{slip}", "{acceleration}", "{vertical}"),
         answers={"": "m"},
+        reading=(
+            f"{NO_JUDGEMENT}: below 1 the run slides less than the rigid block, and the formula is "
+            "the safer one; above 1 the formula is unsafe"
+        ),
     )
 
-    mu: Annotated[float, Positive, RATIO]
+    mu: Annotated[float, Positive, RATIO] | None = None
     slope: Incline = 0.0
     one_sided: bool = False
     towards: Annotated[float, Between(-1.0, 1.0), RATIO] = 0.0
@@ -60,6 +69,68 @@ class NewmarkBlock(Check):
     slip: str = "sliding_base"
     acceleration: str = "a_g_x"
     vertical: str = "a_g_y"
+    part: str = ""
+    weight: Annotated[float, Positive, Unit("N")] | None = None
+    body: str = ""
+
+    def settle(self, history: History, facts: ModelFacts) -> tuple[Self, list[str]]:
+        """Return the check with mu of the run, and sentences about mu and the weight.
+
+        A block that slides to both sides has the friction mu of its part. One that slides to one
+        side, on level ground, is a wall before its fill, which pushes it with T, the tangential
+        force of the first row. It yields under
+
+            k_y = (mu N - |T|)/W,    N the normal force of the first row, W the weight
+
+        which is mu of a block that nothing pushes.
+        """
+        part = self.part or self.slip.removeprefix("sliding_")
+        mu = facts.find_mu(part)
+        weight, notes = self._find_weight(history, facts, part)
+        name = "mu"
+        source = f"the friction of '{part}'"
+        has_forces = f"N_{part}" in history and f"T_{part}" in history
+        if self.one_sided and self.slope == 0.0 and mu is not None and weight and has_forces:
+            normal = float(history[f"N_{part}"][0])
+            push = abs(float(history[f"T_{part}"][0]))
+            name = "mu (the yield coefficient)"
+            source = (
+                f"(mu N - |T|)/W of the first row, mu = {mu:.4g}, N = {normal:.5g} N, "
+                f"T = {push:.5g} N, W = {weight:.5g} N"
+            )
+            mu = (mu * normal - push) / weight
+        if self.mu is not None:
+            told = tell_contradiction(name, self.mu, mu, "", source) if mu is not None else []
+            return self, notes + told
+        if mu is None or mu <= 0.0:
+            return self, notes
+        return replace(self, mu=mu), [*notes, f"{name} is that of the run: {source}"]
+
+    def _find_weight(
+        self, history: History, facts: ModelFacts, part: str
+    ) -> tuple[float | None, list[str]]:
+        """Return the weight of what slides [N], None if it is not known, and sentences about it.
+
+        Args:
+            history: of the run.
+            facts: of its model.
+            part: of the contact.
+        """
+        of_run = None
+        source = f"N_{part} of the first row"
+        if f"N_{part}" in history:
+            of_run = float(history[f"N_{part}"][0])
+        if self.body:
+            if self.body not in facts.masses:
+                names = ", ".join(facts.masses) or "none"
+                return self.weight, [f"the model has no body '{self.body}', it has {names}"]
+            of_run = facts.masses[self.body] * self.gravity
+            source = f"mass of '{self.body}' times g"
+        if self.weight is None:
+            return of_run, []
+        if of_run is None:
+            return self.weight, []
+        return self.weight, tell_contradiction("weight", self.weight, of_run, " N", source)
 
     def numbers(self, history: History) -> Numbers:
         """Return both numbers, and why they cannot be compared."""
@@ -75,6 +146,9 @@ class NewmarkBlock(Check):
         drive = up * sine - along * cosine
 
         why = ""
+        if self.mu is None:
+            why = "the run does not tell a friction above zero that is left: give mu"
+            return Numbers(math.nan, found, why)
         if not along.any():
             why = f"the column {self.acceleration} is zero: name acceleration= that of the ground"
         if normal.min() < 0.0:
@@ -85,7 +159,7 @@ class NewmarkBlock(Check):
         resist = self.mu * np.maximum(normal, 0.0)
         displacement = slide(history["t"], side * drive, resist, one_sided=self.one_sided)
         peak = float(np.abs(along).max())
-        return abs(float(displacement[-1])), found, why, {"a": (peak, "m/s²")}
+        return Numbers(abs(float(displacement[-1])), found, why, {"a": (peak, "m/s²")})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,6 +192,10 @@ class Housner(Check):
         fields=("width", "height", "gravity"),
         reads=("t", "{theta}", "{acceleration}", "{vertical}"),
         answers={"angle": "rad", "impact": "s"},
+        reading=(
+            f"{NO_JUDGEMENT}: an angle above 1 is one that the rigid block does not reach, so that "
+            "the formula is unsafe there"
+        ),
     )
 
     width: Length
@@ -194,7 +272,7 @@ class Housner(Check):
             why = "the rigid block overturns"
         elif math.isnan(expected):
             why = "the rigid block does not land in this time"
-        return expected, found, why, {"alpha": (alpha, "rad"), "theta0": (start, "rad")}
+        return Numbers(expected, found, why, {"alpha": (alpha, "rad"), "theta0": (start, "rad")})
 
 
 def find_impact(t: Array, theta: Array) -> float:

@@ -2,7 +2,6 @@
 (() => {
   const charts = JSON.parse(document.getElementById("charts").textContent);
   const figures = [...document.querySelectorAll("figure.chart")];
-  const palette = ["#1f77b4", "#e07b00", "#2ca02c", "#d6453d", "#9467bd", "#8c6d5f", "#d65fb0", "#8a8a8a", "#a9a61f", "#17a2b8"];
   const decades = [-4, -3, -2, -1, 0, 1].flatMap((power) => [1, 2, 5].map((step) => Number(`${step}e${power}`)));
   const options = { displaylogo: false, responsive: true, modeBarButtons: [["toImage", "zoom2d", "pan2d", "resetScale2d"]] };
   // Plotly reads some HTML in texts: what comes from a file is to be seen as it is.
@@ -15,12 +14,15 @@
   });
   const layout = (chart) => {
     const far = chart.log_y ? { dtick: 2 } : {};
+    // Markers would leave room on both sides of a history.
+    const ends = chart.lines.flatMap((line) => [line.x[0], line.x[line.x.length - 1]]);
+    const span = chart.log_x || !ends.length ? {} : { range: [Math.min(...ends), Math.max(...ends)] };
     return {
       title: { text: plain(chart.title), x: 0.02, xanchor: "left", font: { size: 14 } }, font: { color: colour("--fore"), size: 12 },
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", hovermode: "closest", showlegend: true,
-      margin: { l: 60, r: 16, t: 40, b: 50 }, legend: { orientation: "h", y: -0.22, yanchor: "top", maxheight: 0.3 },
+      margin: { l: 60, r: 16, t: 40, b: 50 }, legend: { orientation: "h", y: -0.32, yanchor: "top", maxheight: 0.3 },
       modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("--soft"), activecolor: colour("--link") },
-      xaxis: { ...axis(chart.x, chart.log_x), ...(chart.log_x ? { tickvals: decades, ticktext: decades.map(String) } : {}) },
+      xaxis: { ...axis(chart.x, chart.log_x), ...span, ...(chart.log_x ? { tickvals: decades, ticktext: decades.map(String) } : {}) },
       yaxis: { ...axis(chart.y, chart.log_y), ...far, ...(chart.log_x ? { rangemode: "tozero" } : {}) },
       shapes: chart.bound === null ? [] : [{ type: "line", xref: "paper", x0: 0, x1: 1, y0: chart.bound, y1: chart.bound,
         line: { color: "#d6453d", dash: "dash", width: 1 }, label: { text: `tolerance ${chart.bound}`, textposition: "start" } }],
@@ -30,11 +32,15 @@
     const names = [...new Set(chart.lines.map((line) => line.name))];
     return [...chart.lines].sort((a, b) => b.pale - a.pale).map((line) => {
       const place = names.indexOf(line.name);
+      // Raw values beside smooth ones are pale and without dashes; black is no colour of a dark page.
+      const raw = line.pale && !chart.log_x;
+      const ink = raw ? colour("--soft") : line.colour === "#1a1a1a" ? colour("--fore") : line.colour;
+      const marked = line.symbol && !line.pale;
       return {
-        x: line.x, y: line.y, name: plain(line.name), type: "scatter", mode: line.dots ? "markers" : "lines", legendgroup: String(place),
-        showlegend: !(line.pale && chart.log_x), opacity: line.pale ? 0.4 : 1, visible: place < chart.shown ? true : "legendonly",
-        line: { width: 1.3, color: palette[place % palette.length], dash: line.dash ? "dot" : "solid" },
-        marker: { size: 3, color: palette[place % palette.length] },
+        x: line.x, y: line.y, name: plain(line.name), type: "scatter", mode: line.dots ? "markers" : marked ? "lines+markers" : "lines",
+        legendgroup: String(place), showlegend: !(line.pale && chart.log_x), opacity: line.pale ? 0.4 : 1,
+        visible: place < chart.shown ? true : "legendonly", line: { width: 1.3, color: ink, dash: raw ? "solid" : line.dash },
+        marker: { size: line.dots ? 3 : 6, color: ink, symbol: line.dots ? "circle" : line.symbol, maxdisplayed: line.dots ? 0 : 8 },
       };
     });
   };
@@ -42,7 +48,11 @@
     const chart = charts[figure.dataset.chart];
     return Plotly.newPlot(figure, traces(chart), layout(chart), options);
   };
-  const repaint = () => figures.forEach((figure) => Plotly.relayout(figure, layout(charts[figure.dataset.chart])));
+  const repaint = () => figures.forEach((figure) => {
+    const chart = charts[figure.dataset.chart];
+    const inks = traces(chart).map((trace) => trace.line.color);
+    Plotly.update(figure, { "line.color": inks, "marker.color": inks }, layout(chart));
+  });
 
   const number = (text) => (/^[-+]?[\d.]+(e[-+]?\d+)?$/i.test(text) ? Number(text) : NaN);
   const sort = (head) => {

@@ -310,12 +310,17 @@ def _refuse_beside_layer(path: Path, tables: Mapping[str, Any]) -> None:
             )
     contact = tables.get("contact", ())
     for table in contact if isinstance(contact, list) else [contact]:
-        for key in ("held", "springs"):
+        for key in ("roller", "springs"):
             if isinstance(table, dict) and table.get(key):
                 raise InputError(
                     f"{path}: [[contact]] has {key}, and [layer] is a law of rigid obstacles from "
                     "which a body may part: leave one of the two out"
                 )
+        if isinstance(table, dict) and "mu" in table:
+            raise InputError(
+                f"{path}: [[contact]] has mu, and [layer] is a law without friction: leave one of "
+                "the two out"
+            )
 
 
 def refuse_ranks(path: Path, body: str, size: int) -> None:
@@ -375,11 +380,11 @@ def _describe_body(
     outline = [
         {"group": name, "lines": np.concatenate(ends).tolist()} for name, ends in lines.items()
     ]
-    clamped = {"kind": "clamped", "groups": ["start"], "components": ["x", "y"][:d]}
+    fixed = {"kind": "fixed", "groups": ["start"], "components": ["x", "y"][:d]}
     return {
         "degree": 1,
         "mass": parts[0]["mass"],
         "bodies": parts,
-        "supports": [clamped],
+        "supports": [fixed],
         "outline": outline,
     }

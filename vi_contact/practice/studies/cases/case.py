@@ -9,6 +9,7 @@ interface.
 [[contact]]       fem.contact_surface, .contact_pair   [gravity]  with_weight, static_equilibrium
 [friction] [impact] [mass] [[excitation]]              [[check]]  to compare with engineering.checks
 [[stage]]  what replaces these tables in stages that follow one another
+[sheet]            whose the report is, which numbers decide in it, and its units
 [beam] [particle]  bodies and their contact, in place of [mesh] and the tables that belong to it
 [layer]            layer.contact_layer, in place of [friction], [impact] and [scheme]
 """
@@ -46,9 +47,11 @@ from ....run.files.writer import FieldWriter
 from ....run.method import with_defaults
 from ....run.recorders import Contact, Energy
 from ....run.recorders.steps import Steps
-from ....run.simulate import Solution, simulate
+from ....run.simulate import Solution, rehearse, simulate
 from ....run.time_steps import StepPlan, plan_steps
+from ....solvers.automatic import Automatic
 from ...engineering.checks.comparison import Check
+from ...sheet.choices import Sheet, refuse_unknown_numbers
 from .bodies import (
     BeamBody,
     Body,
@@ -59,9 +62,12 @@ from .bodies import (
     refuse_ranks,
 )
 from .expressions import check_axes
+from .friction_of_tables import join_laws, list_contacts, list_laws
 from .library import check_format, find_base_folder, keep_copy, refuse_case_of_others
+from .old_keys import renew_keys
 from .own_classes import check_packages
 from .parsing import Words, read, read_arguments, suggest_nearest
+from .sentences import in_words_of_case_files
 from .stage_tables import Stage, split_stages
 from .stages import Reached, run_stages
 from .strain_compatible import CALL, iterate, with_known_damping
@@ -80,7 +86,7 @@ TABLES: dict[str, Any] = {
     "beam": BeamBody,
     "particle": ParticleBody,
     "material": Mapping[str, LinearElastic | Orthotropic | Heterogeneous],
-    "system": make_callee(assemble),
+    "system": make_callee(assemble, keys={"clamped": "fixed"}),
     "strain_compatible": CALL,
     "contact": ContactSurface | Sequence[ContactSurface],
     "layer": LayerLaw,
@@ -101,6 +107,7 @@ TABLES: dict[str, Any] = {
     "record": Recorder | Sequence[Recorder],
     "fields": FieldWriter,
     "check": Check | Sequence[Check],
+    "sheet": make_callee(Sheet),
 }
 
 
@@ -137,6 +144,7 @@ class Case:
         """Return what shakes the body; record files are read here."""
         return self._build_tables("excitation", **context)
 
+    @in_words_of_case_files()
     def check(self) -> None:
         """Make everything that needs no mesh.
 
@@ -148,8 +156,12 @@ class Case:
         for table, node in self.nodes.items():
             if table not in need_mesh and not needs_body(node):
                 self._build_table(table)
-        if not needs_body(self.nodes["run"]):
+        self.list_friction()
+        run = self.nodes["run"]
+        if not needs_body(run):
             self._check_steps(self._build_table("run"))
+        elif "steps" in run.arguments:  # the time step is known with the body only
+            self._check_steps({"dt": 1.0, "steps": run.arguments["steps"]})
         if self.body is not None:
             self._build_body_problem(self.body)
 
@@ -163,6 +175,7 @@ class Case:
         except InputError as error:
             raise InputError(f"{self.path}: [run] {error}") from None
 
+    @in_words_of_case_files()
     def problem(self, comm: Any, parts: Parts | None = None) -> ContactProblem:
         """Return the contact problem; ``parts``: those of ``parts``, when they are known.
 
@@ -185,6 +198,7 @@ class Case:
             return arguments
         return arguments | {"t_end": self._find_duration(parts)}
 
+    @in_words_of_case_files()
     def columns(self, comm: Any, parts: Parts | None = None) -> frozenset[str]:
         """Return the columns that a run writes into history.csv; computes no step.
 
@@ -204,10 +218,20 @@ class Case:
             if np.ndim(value) == 0
         )
 
+    def check_sheet(self, comm: Any, parts: Parts) -> None:
+        """Raise InputError for numbers of [sheet] that a run does not have. Collective."""
+        if self.sheet.numbers is None:
+            return
+        try:
+            refuse_unknown_numbers(self.sheet, self.columns(comm, parts))
+        except InputError as error:
+            raise self.nodes["sheet"].spot.make_table_error(f"{error}") from error
+
     def _build_recorders(self, parts: Parts) -> tuple[Recorder, ...] | None:
         """Return the recorders of [[record]]; None for those of ``simulate``."""
         return self._build_tables("record", tags=parts.tags) if "record" in self.nodes else None
 
+    @in_words_of_case_files()
     def run(
         self,
         comm: Any,
@@ -244,7 +268,11 @@ class Case:
         folder = self.out if out is None else Path(out)
         # before any work; ``simulate`` looks once more, with the folder's lock
         if folder is not None:
-            on_root(MpiComm(comm), partial(self._refuse_files_of_others, folder))
+            on_root(MpiComm(comm), partial(self.refuse_files_of_others, folder))
+        parts = None
+        if self.sheet.numbers is not None:
+            parts = self.parts(comm)
+            self.check_sheet(comm, parts)
         if "strain_compatible" in self.nodes:
             return iterate(
                 self, comm, folder, restart=restart, progress=progress, wall_time=wall_time
@@ -260,14 +288,14 @@ class Case:
                 changed=changed,
                 wall_time=wall_time,
             )
-        parts = self.parts(comm)
+        parts = parts or self.parts(comm)
         with self.call(parts, folder) as call:
             self.keep_model(comm, parts, folder)
             return simulate(
                 **call, restart=restart, progress=progress, changed=changed, wall_time=wall_time
             )
 
-    def _refuse_files_of_others(self, folder: Path) -> None:
+    def refuse_files_of_others(self, folder: Path) -> None:
         """Raise InputError for files that the run would replace and that no run has made."""
         refuse_files_of_others(folder)
         refuse_case_of_others(self.path, folder)
@@ -281,7 +309,7 @@ class Case:
             folder: of the run; None: without.
         """
         if folder is not None:
-            from .description import FEW, describe, write_model  # late: it reads cases
+            from .description.model import FEW, describe, write_model  # late: it reads cases
 
             write_model(parts.system.algebra.comm, describe(self, comm, parts, most=FEW), folder)
 
@@ -309,6 +337,21 @@ class Case:
                 f"{self.path}: [strain_compatible] is for single runs: leave it out of stages and "
                 "studies"
             )
+        arguments = self._build_call(parts, folder, state)
+        ranks = parts.system.algebra.comm
+        with lock_folder(ranks, None if folder is None else run_folder(ranks, folder)):
+            if folder is not None:
+                keep_copy(self.path, self.settings, folder, ranks)
+            yield arguments
+
+    def _build_call(self, parts: Parts, folder: Path | None, state: State | None) -> dict[str, Any]:
+        """Return the call of ``simulate``; its weight is brought to rest. Collective.
+
+        Args:
+            parts: as of ``call``.
+            folder: of the run; None: without.
+            state: the first one, when it is known.
+        """
         problem = self._build_problem(parts)
         arguments = self._build_run(parts)
         arguments.pop("out", None)
@@ -318,21 +361,47 @@ class Case:
 
             static_solver = solver.primary if isinstance(solver, CrossChecked) else solver
             state = static_equilibrium(problem, solver=static_solver)
-        ranks = problem.system.algebra.comm
-        with lock_folder(ranks, None if folder is None else run_folder(ranks, folder)):
-            if folder is not None:
-                keep_copy(self.path, self.settings, folder, ranks)
-            yield arguments | {
-                "problem": problem,
-                "scheme": self._build_scheme(),
-                "solver": solver,
-                "state": state,
-                "out": folder,
-                "record": self._build_recorders(parts),
-                "escalation": self._build_tables("escalation"),
-                "fields": self._build_table("fields"),
-                "cross_check": solver if isinstance(solver, CrossChecked) else None,
-            }
+        return arguments | {
+            "problem": problem,
+            "scheme": self._build_scheme(),
+            "solver": solver,
+            "state": state,
+            "out": folder,
+            "record": self._build_recorders(parts),
+            "escalation": self._build_tables("escalation"),
+            "fields": self._build_table("fields"),
+            "cross_check": solver if isinstance(solver, CrossChecked) else None,
+        }
+
+    def rehearse(
+        self, parts: Parts, folder: Path, *, state: State | None = None, at_rest: bool = True
+    ) -> None:
+        """Do what a run does before its first step, and write nothing of it. Collective.
+
+        Args:
+            parts: as of ``call``.
+            folder: which the run would have.
+            state: the first one, when it is known.
+            at_rest: whether a problem with weight is brought to its equilibrium, as a run does;
+                False begins in the displacements at the start, which costs no factor.
+
+        Raises:
+            InputError: whatever the run refuses before its first step.
+        """
+        if not at_rest:
+            parts = replace(parts, weighted=False)
+        rehearse(**self._build_call(parts, folder, state))
+
+    def describe_method(self, problem: ContactProblem) -> dict[str, str]:
+        """Return scheme, mass and solver with which a problem of the case is marched, in words."""
+        problem, scheme = with_defaults(problem, self._build_scheme())
+        solver = self._build_table("solver") or Automatic()
+        solvers = (solver, *self._build_tables("escalation"))
+        return {
+            "scheme": repr(scheme),
+            "mass": repr(problem.mass),
+            "solver": ", then ".join(map(repr, solvers)),
+        }
 
     def _build_table(self, table: str, **context: Any) -> Any:
         """Return what a table makes; None where there is none."""
@@ -351,6 +420,11 @@ class Case:
         table = find_body_table(self.nodes)
         body: Body | None = self._build_table(table) if table else None
         return body
+
+    @cached_property
+    def sheet(self) -> Sheet:
+        """Return what [sheet] says of the report."""
+        return self._build_table("sheet") or Sheet()
 
     @cached_property
     def layer(self) -> "ContactLayer | None":
@@ -373,6 +447,14 @@ class Case:
         friction: FrictionLaw | None = self._build_table("friction") if slides else None
         return friction or Frictionless()
 
+    def list_friction(self) -> list[FrictionLaw]:
+        """Return the law of friction of each [[contact]].
+
+        Raises:
+            InputError: the mu of a table does not go with [friction].
+        """
+        return list_laws(self._build_friction(), list_contacts(self.nodes.get("contact", ())))
+
     def _build_body_problem(self, body: Body) -> ContactProblem:
         """Return the problem of a body without a mesh, before its excitations."""
         try:
@@ -382,6 +464,7 @@ class Case:
                 f"{error}"
             ) from error
 
+    @in_words_of_case_files()
     def parts(self, comm: Any) -> Parts:
         """Return what the problem is made of; collective."""
         if self.body is not None:
@@ -452,7 +535,11 @@ class Case:
         return ContactProblem(
             parts.system,
             parts.surface,
-            friction=self._build_friction(),
+            friction=join_laws(
+                self._build_friction(),
+                list_contacts(self.nodes.get("contact", ())),
+                parts.surface,
+            ),
             impact=self._build_table("impact"),
             mass=self._build_table("mass") or parts.mass,
             excitation=() if parts.moved else self.excitations(system=parts.system),
@@ -488,7 +575,7 @@ def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence
     """
     check_type("read_case", "path", path, str | Path)
     path = Path(path)
-    tables = read_toml(path)
+    tables, settings = renew_keys(path, read_toml(path), settings)
     case = _read_tables(path, with_settings(tables, settings), settings, allow)
     unread = _collect_unread(case)
     if unread:

@@ -24,6 +24,7 @@ LENGTH = 500  # characters of a text, at most
 DEPTH = 20  # of brackets in each other
 POWER = 100  # of an exponent that is a number
 _WORD = re.compile(r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?|[A-Za-z]\w*|[-+*/^(),]", re.ASCII)
+_WITHOUT_SIGN = re.compile(r"[\w.)]\s+([A-Za-z]\w*)", re.ASCII)  # as kN in "9.81*y kN"
 _Functions = Mapping[str, Callable[..., Any]]
 _OF_ONE_VALUE: _Functions = {
     "sqrt": np.sqrt,
@@ -80,6 +81,12 @@ class Expression:
             tree = ast.parse(words.replace("^", "**").strip(), mode="eval").body
         except (SyntaxError, RecursionError, MemoryError):
             # MemoryError: the parser's stack is full
+            lone = _WITHOUT_SIGN.search(self.text)
+            if lone is not None:
+                raise InputError(
+                    f"'{lone[1]}' in it has no sign before it: give one, or leave it out if it is "
+                    "a unit, as arithmetic with variables is in SI units"
+                ) from None
             raise InputError("its brackets, signs or commas are not arithmetic") from None
         object.__setattr__(self, "program", tuple(self._compile(tree, 0)))
 

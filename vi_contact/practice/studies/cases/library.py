@@ -5,6 +5,8 @@ Keep in a run folder the copy of the case that made it.
 
 import re
 from collections.abc import Mapping, Sequence
+from hashlib import sha256
+from itertools import dropwhile
 from pathlib import Path
 from typing import Any
 
@@ -159,6 +161,20 @@ def read_copy(folder: Path) -> dict[str, Any]:
     if not is_own(path):
         return {}
     return with_settings(read_toml(path), read_settings(folder))
+
+
+def compute_checksum(folder: Path) -> str:
+    """Return the SHA-256 of the case that made a run folder, without the notes of its copy.
+
+    It is that of the case file itself; "" where no case file made the folder.
+    """
+    path = folder / COPY
+    if not is_own(path):
+        return ""
+    lines = read_bytes(path).splitlines(keepends=True)
+    marks = (_SET.encode(), _FROM.encode())
+    kept = dropwhile(lambda line: line.startswith(marks), lines)
+    return sha256(b"".join(kept)).hexdigest()
 
 
 def read_settings(folder: Path) -> list[str]:

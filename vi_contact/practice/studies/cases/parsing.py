@@ -5,6 +5,7 @@ import os
 from collections import ChainMap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, is_dataclass, replace
+from datetime import date
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, get_args, get_origin
@@ -132,6 +133,8 @@ def _read_scalar(value: Any, member: Any, spot: Spot, words: Words) -> Node | No
     if isinstance(value, int | float) and member is float:
         return float(value)
     if isinstance(value, int) and member is int:
+        return value
+    if isinstance(value, date) and member is date:
         return value
     return _read_text(value, member, spot, words) if isinstance(value, str) else None
 
@@ -264,7 +267,13 @@ def _show(value: Any) -> str:
     return f"'{value[:SHOWN]}'" if isinstance(value, str) else quote(value)
 
 
-_SCALARS = {float: "a number", int: "a whole number", bool: "true or false", str: "text"}
+_SCALARS = {
+    float: "a number",
+    int: "a whole number",
+    bool: "true or false",
+    str: "text",
+    date: "a date",
+}
 
 
 def _describe_all(members: Sequence[Any], words: Words) -> str:

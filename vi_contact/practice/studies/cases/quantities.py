@@ -1,5 +1,7 @@
 """Read texts where numbers or functions are asked for: "30 MPa", "2*9.81", "9810*max(0, 35 - y)".
 
+Arithmetic of numbers alone may have a unit behind it: "50*9.81 kN/m2".
+
 A unit is a product of powers, as "kN/m3", "kg/m^3", "Pa*s", "1/s"; its dimension must be that of
 the key, whose unit stands in the annotation of the argument (``core.quantities``).
 """
@@ -22,6 +24,11 @@ AT_START = Callable[[Array], Array]  # of points
 HISTORY = Callable[[float], float]  # of the time
 _NUMBER = r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _VALUE = re.compile(rf"(?<![\w.\s])\s*((?>{_NUMBER}))\s*((?:1\s*/\s*)?{NAME}[^()+]*)")
+# arithmetic of numbers alone with a unit behind it: "50*9.81 kN/m2"
+_ARITHMETIC = re.compile(
+    rf"(?<![-+*/^().\w\s])((?>(?:[-+*/^().\d\s]|(?<=[\d.])[eE](?=[-+\d]))+))(?<=\s)({NAME}[^()+]*)",
+    re.ASCII,
+)
 
 
 def read_quantity(text: str, members: Sequence[Any], spot: Spot) -> Any:
@@ -109,7 +116,9 @@ def _read_expression(text: str, letters: str, spot: Spot) -> Expression:
 
     The number is in the unit of the key.
     """
-    match = _VALUE.fullmatch(text.rstrip()) if len(text) <= LENGTH else None
+    match = None
+    if len(text) <= LENGTH:
+        match = _VALUE.fullmatch(text.rstrip()) or _ARITHMETIC.fullmatch(text.rstrip())
     try:
         # "2 x" is arithmetic of a variable, and no number of a unit x.
         if match is None or match[2] in tuple(letters):
@@ -122,7 +131,8 @@ def _read_expression(text: str, letters: str, spot: Spot) -> Expression:
         if dimension != own_dimension:
             proper = "% or as a plain number" if spot.unit == "1" else spot.unit
             raise InputError(f"{quote(unit)} is not a unit of it: give it in {proper}")
-        return Expression(repr(float(number) * (factor / own_factor)))
+        value = float(Expression(number)())
+        return Expression(repr(value * (factor / own_factor)))
     except InputError as error:
         variables = f" of {', '.join(letters)}" if letters else ""
         remedy = ""

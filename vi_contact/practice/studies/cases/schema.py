@@ -6,6 +6,7 @@ It is made from the annotations that read case files.
 import json
 import math
 from collections.abc import Mapping, Sequence
+from datetime import date
 from inspect import getdoc
 from pathlib import Path
 from typing import Any, get_args, get_origin
@@ -28,6 +29,7 @@ _PLAIN: Mapping[Any, Any] = {
     int: {"type": ["integer", "string"]},
     bool: {"type": "boolean"},
     str: {"type": "string"},
+    date: {"type": "string"},
     HISTORY: {"type": ["number", "string"]},
     Expression: {"type": "string"},
     FIELD: {"type": ["string", "array"]},
@@ -136,6 +138,7 @@ class _Schema:
         members = [member for member in members if member != FIELD or float not in members]
         choices = [choice for member in members for choice in self._describe_member(member)]
         choices += self._describe_tables(members)
+        choices = [choice for k, choice in enumerate(choices) if choice not in choices[:k]]
         if not choices or {} in choices:
             return {}
         return choices[0] if len(choices) == 1 else {"anyOf": choices}

@@ -85,6 +85,35 @@ def run_leading_stages(case: Any, comm: Any) -> tuple[Reached | None, Parts, Sta
     return reached, parts, state
 
 
+def rehearse_stages(case: Any, comm: Any, folder: Path, *, solve: bool) -> None:
+    """Do what the stages of a case do before their first steps; collective.
+
+    Static stages that come first are solved, as what they leave decides what may follow them. The
+    stages after a dynamic one begin in the displacements at the start here.
+
+    Args:
+        case: a ``Case`` with stages.
+        comm: the ranks.
+        folder: which the run would have.
+        solve: whether static stages are solved.
+
+    Raises:
+        InputError: whatever the run refuses before the first step of a stage.
+    """
+    known = 0
+    if solve:
+        reached, parts, state = run_leading_stages(case, comm)
+        known = 0 if reached is None else reached.number
+        case.stages[known].case.rehearse(parts, folder, state=state)
+        known += 1
+    for stage in case.stages[known:]:
+        parts = replace(stage.case, ready=case.meshed(comm)).parts(comm)
+        if stage.static:
+            parts = replace(parts, moved=True)
+        first = initial_state(stage.case.problem(comm, parts))
+        stage.case.rehearse(parts, folder, state=first)
+
+
 def run_stages(
     case: Any,
     comm: Any,

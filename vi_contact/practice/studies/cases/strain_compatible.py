@@ -54,9 +54,8 @@ def iterate(
         InputError: for a restart, another damping than ``DampingRatio``, and a last stage that is
             static.
     """
-    spot = f"{case.path}: [strain_compatible]"
     system = case.nodes["system"]
-    _refuse_unfit(case, system, spot, restart)
+    refuse_unfit(case, restart)
     ranks = MpiComm(comm)
     numbers = count()  # of the runs that have begun
     mesh, tags = case.meshed(comm)
@@ -90,14 +89,15 @@ def iterate(
         return iteration.solution
 
 
-def _refuse_unfit(case: Any, system: Call, spot: str, restart: bool | str | Path) -> None:
-    """Raise InputError where strains cannot be iterated."""
+def refuse_unfit(case: Any, restart: bool | str | Path = False) -> None:
+    """Raise InputError where strains cannot be iterated; ``restart``: as of ``iterate``."""
+    spot = f"{case.path}: [strain_compatible]"
     if restart:
         raise InputError(
             f"{spot} begins with the soil at small strains and cannot be continued: run it from "
             "the start"
         )
-    damping = system.arguments.get("damping")
+    damping = case.nodes["system"].arguments.get("damping")
     if not isinstance(damping, Call) or damping.callee.name != "DampingRatio":
         raise InputError(
             f"{spot} gives every cell its damping ratio: give [system.damping] type = "

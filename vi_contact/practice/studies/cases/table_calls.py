@@ -20,6 +20,7 @@ from typing import Any
 
 from ....core.errors import InputError
 from ....core.quantities import Quantity, read_quantities
+from .sentences import write_for_case_files
 
 Context = Mapping[str, Any]
 # What has been read: a Group or Call, a tuple or dict of nodes; all else stands for itself.
@@ -125,6 +126,7 @@ class Callee:
         quantities: parameter that a file may give -> what its annotation says.
         required: parameters that a file must give.
         supplied: parameters that the context supplies.
+        parameters: key of the file -> parameter, where their names differ.
     """
 
     name: str
@@ -132,6 +134,7 @@ class Callee:
     quantities: Mapping[str, Quantity]
     required: frozenset[str] = frozenset()
     supplied: tuple[str, ...] = ()
+    parameters: Mapping[str, str] = field(default_factory=dict)
 
     @cached_property
     def hints(self) -> Mapping[str, Any]:
@@ -150,6 +153,7 @@ def make_callee(
     name: str = "",
     only: Sequence[str] = (),
     supplied: Sequence[str] = SUPPLIED,
+    keys: Mapping[str, str] | None = None,
 ) -> Callee:
     """Return how to call a function or class.
 
@@ -158,6 +162,7 @@ def make_callee(
         name: the word of the file for it; "" for its own name.
         only: the parameters that a file may give; empty for all.
         supplied: the parameters that the context supplies, if the function has them.
+        keys: parameter -> key of the file, where the file has another word.
     """
     # A plain class has its annotations at __init__, a dataclass at its fields.
     plain_class = isinstance(function, type) and not is_dataclass(function)
@@ -171,12 +176,15 @@ def make_callee(
         if parameter.kind not in collecting
     }
     settable = [key for key in parameters if key not in supplied and (not only or key in only)]
+    words = keys or {}
+    needed = [key for key in settable if parameters[key].default is Parameter.empty]
     return Callee(
         name or getattr(function, "__name__", ""),
         function,
-        {key: quantity_of.get(key, Quantity(Any)) for key in settable},
-        frozenset(key for key in settable if parameters[key].default is Parameter.empty),
+        {words.get(key, key): quantity_of.get(key, Quantity(Any)) for key in settable},
+        frozenset(words.get(key, key) for key in needed),
         tuple(key for key in parameters if key in supplied),
+        {word: key for key, word in words.items()},
     )
 
 
@@ -196,11 +204,14 @@ class Call:
                 f"{self.callee.name} needs the {lacking[0]}, still unknown here: give numbers"
             )
         supplied = {name: context[name] for name in self.callee.supplied}
-        arguments = build(self.arguments, context)
+        parameters = self.callee.parameters
+        arguments = {
+            parameters.get(key, key): build(value, context) for key, value in self.arguments.items()
+        }
         try:
             return self.callee.function(**supplied, **arguments)
         except InputError as error:
-            raise self.spot.make_table_error(f"{error}") from error
+            raise self.spot.make_table_error(write_for_case_files(str(error))) from error
 
 
 def needs_body(node: Node) -> bool:

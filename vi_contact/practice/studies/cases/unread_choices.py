@@ -38,7 +38,7 @@ OF_CONTACT = {  # what does not happen
 STRAIGHT = {"rod_problem": "the tip of a rod", "particle_problem": "a particle"}
 MASSES = ("ConsistentMass", "Redistributed")
 WITHOUT_RATES = ("Coulomb", "Tresca")
-SUPPORTS = ("clamped", "prescribed", "tied", "dashpots")
+SUPPORTS = ("fixed", "prescribed", "tied", "dashpots")
 AT_START = ("initial_displacement", "initial_velocity")
 Finding = tuple[str, str]  # the key that is in vain, and the sentence
 
@@ -107,7 +107,7 @@ def find_left_over(path: Path, tables: Mapping[str, Any]) -> Iterator[str]:
     """
     stages = tables.get("stage", ())
     if stages and all(stage.get("type") == "static" for stage in stages):
-        for key in OF_MOTION:
+        for key in (*OF_MOTION, "sheet"):
             if key in tables:
                 yield (
                     f"[{key}] of {path} is for motions and is not read, as every [[stage]] is "
@@ -196,6 +196,7 @@ def _find_vain_contact_laws(part: Part) -> Iterator[Finding]:
     """
     surfaces = [call for key in ("contact", *BODY_TABLES) for call in part.list_calls(key)]
     yield from _find_friction_without_slip(part)
+    yield from _find_replaced_friction(part)
     for table, happens in OF_CONTACT.items():
         laws = part.list_calls(table)
         # A law of masses of others may change all masses.
@@ -251,10 +252,31 @@ def _find_friction_without_slip(part: Part) -> Iterator[Finding]:
             )
 
 
+def _find_replaced_friction(part: Part) -> Iterator[Finding]:
+    """Yield friction of which no contact has the coefficient."""
+    contacts = part.list_calls("contact")
+    all_have = bool(contacts) and all("mu" in contact.arguments for contact in contacts)
+    if part.list_calls("friction") and all_have:
+        yield (
+            "friction",
+            (
+                f"{part.label}: [friction] has no effect, as every [[contact]] has a mu of its "
+                "own: leave it out"
+            ),
+        )
+
+
+def _find_friction(part: Part) -> str:
+    """Return the word of the law of friction; "" without."""
+    if any(contact.arguments.get("mu") is not None for contact in part.list_calls("contact")):
+        return "Coulomb"
+    laws = [call.callee.name for call in part.list_calls("friction")]
+    return next((law for law in laws if law != "Frictionless"), "")
+
+
 def _find_vain_solvers(part: Part) -> Iterator[Finding]:
     """Yield methods for steps that the case does not have, and solvers that have failed before."""
-    laws = [call.callee.name for call in part.list_calls("friction")]
-    friction = next((law for law in laws if law != "Frictionless"), "")
+    friction = _find_friction(part)
     for table in ("solver", "escalation"):
         for call in part.list_calls(table):
             if call.callee.name == "Condensed":

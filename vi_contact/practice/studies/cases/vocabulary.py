@@ -27,7 +27,7 @@ from ....core import (
 )
 from ....core.arguments import check_arguments
 from ....core.corners import FEATURE_ANGLE
-from ....core.quantities import RATIO, Positive, Unit
+from ....core.quantities import RATIO, NotNegative, Positive, Unit
 from ....core.system import SemiDiscreteSystem
 from ....core.units import STANDARD_GRAVITY
 from ....fem import (
@@ -91,6 +91,10 @@ _KINDS: Mapping[ModuleType, tuple[Any, ...]] = {  # room -> the kinds of things 
 }
 
 
+# of a table [[contact]]: ``friction_of_tables`` reads it
+FrictionCoefficient = Annotated[float, NotNegative, RATIO]
+
+
 @dataclass(frozen=True)
 class MeshFile:
     """Hold what [mesh] makes of type = "read_mesh": the path of a file for ``fem.read_mesh``."""
@@ -125,6 +129,7 @@ def record(
     return record if processing is None else processing(record)
 
 
+@check_arguments
 def surface(
     system: SemiDiscreteSystem,
     facets: Facets,
@@ -132,10 +137,11 @@ def surface(
     obstacle: Obstacle | None = None,
     points: Annotated[Sequence[tuple[float, ...]] | None, Unit("m")] = None,
     feature_angle: Annotated[float, Unit("rad")] = FEATURE_ANGLE,
-    held: bool = False,
+    roller: bool = False,
     springs: Annotated[float | None, Unit("Pa/m")] = None,
     frictionless_corners: bool = False,
     hinges: bool = False,
+    mu: FrictionCoefficient | None = None,
     name: str = "",
 ) -> ContactSurface:
     """Make a ``contact_surface``.
@@ -146,10 +152,11 @@ def surface(
         obstacle: what it may touch; None: ``Touching()``.
         points: (k, d) [m]; only the nodes nearest to them have conditions; None: all have.
         feature_angle: angle [rad]; facets that turn by less from one another are one smooth face.
-        held: makes it bilateral everywhere.
+        roller: makes it bilateral everywhere: it slides along the face and stays on it.
         springs: foundation modulus [Pa/m] of the springs on which it rests; None: without.
         frictionless_corners: whether nodes with several conditions slide freely over their faces.
         hinges: whether the body may hang together with another one by nodes of this boundary.
+        mu: coefficient of friction of this surface; None: that of [friction].
         name: of the surface, as ``part`` of recorders.
     """
     result = fem.contact_surface(
@@ -159,9 +166,10 @@ def surface(
         result = result.on_springs(springs)
     if frictionless_corners:
         result = result.with_frictionless_corners()
-    return result.bilateral_everywhere() if held else result
+    return result.bilateral_everywhere() if roller else result
 
 
+@check_arguments
 def pair(
     system: SemiDiscreteSystem,
     facets1: Facets,
@@ -170,12 +178,13 @@ def pair(
     matching: Matching | None = None,
     points: Annotated[Sequence[tuple[float, ...]] | None, Unit("m")] = None,
     feature_angle: Annotated[float, Unit("rad")] = FEATURE_ANGLE,
-    held: bool = False,
+    roller: bool = False,
     frictionless_corners: bool = False,
     hinges: bool = False,
+    mu: FrictionCoefficient | None = None,
     name: str = "",
 ) -> ContactSurface:
-    """Make a ``contact_pair``; held: ``.bilateral_everywhere()``; the others: as of ``surface``.
+    """Make a ``contact_pair``; roller: ``.bilateral_everywhere()``; the others: as of ``surface``.
 
     Args:
         system: of the bodies.
@@ -184,9 +193,10 @@ def pair(
         matching: how side 1 finds side 2; None: ``NodeToNode()``.
         points: as of ``surface``.
         feature_angle: as of ``surface``.
-        held: as of ``surface``.
+        roller: as of ``surface``.
         frictionless_corners: as of ``surface``.
         hinges: as of ``surface``.
+        mu: as of ``surface``.
         name: as of ``surface``.
     """
     result = fem.contact_pair(
@@ -200,7 +210,7 @@ def pair(
     )
     if frictionless_corners:
         result = result.with_frictionless_corners()
-    return result.bilateral_everywhere() if held else result
+    return result.bilateral_everywhere() if roller else result
 
 
 def weight(
@@ -282,6 +292,7 @@ def resultants(
     centre: Annotated[tuple[float, ...] | None, Unit("m")] = None,
     normal: tuple[float, ...] | None = None,
     part: Facets | str | tuple[tuple[float, ...], ...] | None = None,
+    toe: Annotated[tuple[float, ...] | None, Unit("m")] = None,
 ) -> run.Resultants:
     """Record ``Resultants``; part: the name of a [[contact]] or of a boundary group, or a box.
 
@@ -290,8 +301,28 @@ def resultants(
         centre: (d,) point of reference [m]; None: as of ``Resultants``.
         normal: (d,) direction of N towards the support; None: the mean contact direction.
         part: of the contact; None: all of it.
+        toe: (d,) point at the end over which the body would tip [m].
     """
-    return run.Resultants(name, centre, normal=normal, part=part)
+    return run.Resultants(name, centre, normal=normal, part=part, toe=toe)
+
+
+def probe(
+    points: Annotated[Mapping[Any, tuple[float, ...]], Unit("m")],
+    velocity: bool = False,
+    acceleration: bool = False,
+    nearest: bool = False,
+    cells: Cells | None = None,
+) -> run.Probe:
+    """Record ``Probe``, at points of a cell group where ``cells`` names one.
+
+    Args:
+        points: label -> (d,) [m].
+        velocity: whether velocities are recorded too.
+        acceleration: whether absolute accelerations are recorded too.
+        nearest: whether every point takes its nearest node.
+        cells: the body that the points are of; None: the whole mesh.
+    """
+    return run.Probe(points, velocity, acceleration, nearest, cells)
 
 
 def upgoing(
@@ -400,7 +431,7 @@ _FUNCTIONS: Mapping[Any, Mapping[str, Callable[[], Any]]] = {
     Schedule: {"FirstModePeriod": lambda: first_mode_period},
     Heterogeneous: {"Heterogeneous": lambda: heterogeneous},
     Obstacle: {"AnalyticGap": lambda: analytic_gap},
-    Recorder: {"Resultants": lambda: resultants},
+    Recorder: {"Resultants": lambda: resultants, "Probe": lambda: probe},
     BeamBody: {
         name: lambda name=name: getattr(bodies, name)  # type: ignore[misc]
         for name in ("rod_problem", "beam_problem", "rubbing_problem")
@@ -412,6 +443,54 @@ _FUNCTIONS: Mapping[Any, Mapping[str, Callable[[], Any]]] = {
         "ContactLayer": lambda: layer.ContactLayer,
     },
 }
+
+
+# kind -> where a case file makes such a thing: a table, or the key of one
+_PLACES: tuple[tuple[Any, str], ...] = (
+    (Scheme, "[scheme]"),
+    (Solver, "[solver]"),
+    (FrictionLaw, "[friction]"),
+    (ImpactLaw, "[impact]"),
+    (MassLaw, "[mass]"),
+    (Excitation, "[[excitation]]"),
+    (Recorder, "[[record]]"),
+    (FieldWriter, "[fields]"),
+    (MeshScript, "[mesh]"),
+    (LinearElastic, "[material.NAME]"),
+    (Orthotropic, "[material.NAME]"),
+    (Heterogeneous, "[material.NAME]"),
+    (Damping, "[system.damping]"),
+    (Section, "[system.section]"),
+    (Traction, "[[system.loads]]"),
+    (BodyForce, "[[system.loads]]"),
+    (Prescribed, "[[system.prescribed]]"),
+    (Dashpots, "[[system.dashpots]]"),
+    (Matching, "matching"),
+    (Obstacle, "obstacle"),
+    (SmallMethod, "method"),
+    (FrictionMethod, "method"),
+    (Method, "method"),
+    (Extrapolation, "extrapolation"),
+    (VelocityUpdate, "update"),
+)
+
+
+def find_word(name: str) -> tuple[str, tuple[str, ...]] | None:
+    """Return the table or key of a case file that makes an object of a class, and its keys.
+
+    Args:
+        name: of the class, or of a constructor, as "GeneralisedAlpha.spectral_radius".
+
+    Returns:
+        "[scheme]" or "matching", and the names of the parameters; None where no case file has it.
+    """
+    choices_of_kind = _gather_choices()
+    for kind, place in _PLACES:
+        try:
+            return place, tuple(choices_of_kind[kind][name].quantities)
+        except KeyError:
+            continue
+    return None
 
 
 def list_names(kind: Any) -> tuple[str, ...]:

@@ -32,7 +32,7 @@ from ....run.files.reading import read_run
 from ....run.wall_time import WallTime
 from ...plots.studies import DemandPanel, plot_fragility, plot_ida
 from ..cases.case import Case, read_case
-from ..cases.description import describe
+from ..cases.description.model import describe
 from ..cases.parsing import suggest_nearest
 from .fragility import bracket_capacities, fragility_curve, read_limit
 from .measures import Demand, Intensity, compute_fractiles, read_demand, read_intensity
@@ -47,6 +47,8 @@ SHARES = (0.16, 0.50, 0.84)  # of the records below the curves of the figure
 TABLE = "ida.csv"
 COLUMNS = "columns.json"
 FIGURE = "ida.png"
+DIGITS = 12  # of an intensity: rounding beyond them would print a level of 1 as 0.9999999999999999
+STRETCHED = 4.0  # a record that is multiplied by more is no longer like a quake of that strength
 STUDY = "ida.json"
 RUNS = "runs"
 FRAGILITY = "fragility.csv"
@@ -220,6 +222,7 @@ def run_ida(
         left = [run for run in mine if run.read_finished() is None]
         if left:
             _check_demands(study)
+        _tell_stretched(left, say)
         say(
             f"{len(every)} runs, {len(mine)} of them here, {len(mine) - len(left)} finished already"
         )
@@ -274,6 +277,20 @@ class _Progress:
         )
 
 
+def _tell_stretched(runs: Sequence[OneRun], say: Callable[[str], None]) -> None:
+    """Say which records are multiplied by more than STRETCHED, and by how much at most."""
+    factors: dict[str, float] = {}
+    for run in runs:
+        if run.factor > STRETCHED:  # NaN is not
+            factors[run.shaking.name] = max(run.factor, factors.get(run.shaking.name, 0.0))
+    if factors:
+        names = ", ".join(f"{name} by up to {factor:.3g}" for name, factor in factors.items())
+        say(
+            f"records are multiplied by more than {STRETCHED:g}: {names}; a strong quake has "
+            "another spectrum than a weak one enlarged, so take stronger records or lower levels"
+        )
+
+
 def _check_demands(study: IDA) -> None:
     """Raise InputError before the first run for a demand without a column.
 
@@ -297,7 +314,9 @@ def _claim_folder(study: IDA, out: Path) -> None:
     Raises:
         InputError: for the folder of another study, and for files that no study has made.
     """
-    case = _digest(to_json(study.case.tables).encode())
+    # What a report says beside the mechanics makes no other study.
+    tables = {name: table for name, table in study.case.tables.items() if name != "sheet"}
+    case = _digest(to_json(tables).encode())
     records = {shaking.name: _digest_files(shaking) for shaking in study.shakings}
     old = read_json(out / STUDY)
     if old is None:
@@ -397,7 +416,8 @@ def _tabulate(
             shaking = Shaking(row["record"], tuple(map(Path, row["files"])))
             with suppress(InputError):
                 unscaled = measure.compute(shaking.record(case))
-                measured[measure.name] = unscaled * row["scale"] ** measure.degree
+                intensity = unscaled * row["scale"] ** measure.degree
+                measured[measure.name] = float(f"{intensity:.{DIGITS}g}")
         if row["status"] == "finished":
             history, columns = _read_history(folder, tuple(demand.column for demand in demands))
             for demand in demands:

@@ -1,0 +1,1 @@
+"""Describe the model that a case file makes, before any step."""

@@ -1,0 +1,127 @@
+"""Describe what holds the bodies of a model, and where they may touch."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from .....core.algebra import Array, largest, total
+from .....core.problem import ContactProblem
+from .....core.step import AXES
+from .....fem.mesh.tagged_mesh import Facets
+from .....fem.output.outline import facets_with_cells
+from ..bodies import Body
+from ..friction_of_tables import find_mu
+from ..table_calls import Group, walk_nodes
+
+
+def describe_supports(space: Any) -> Iterator[dict[str, Any]]:
+    """Yield what holds the bodies, moves them, absorbs or lets in waves.
+
+    Ties of sides to each other are among it.
+    """
+    for support in space.prescribed:
+        kind = "fixed" if support.components is None else "roller, fixed"
+        if support.moves:
+            kind = "moved"
+        yield _describe_support(space, kind, [support.name], support.components)
+    for boundary in space.forms.boundaries:
+        yield _describe_support(space, type(boundary).__name__, [boundary.facets.name], None)
+    for tie in space.ties:
+        yield _describe_support(space, "tied", [tie.first.name, tie.second.name], tie.components)
+
+
+def _describe_support(
+    space: Any, kind: str, groups: list[str], components: Sequence[int] | None
+) -> dict[str, Any]:
+    """Return a support, with the names of its components; None stands for all."""
+    axes = range(space.dimension) if components is None else components
+    return {"kind": kind, "groups": groups, "components": [AXES[axis] for axis in axes]}
+
+
+def describe_contact(
+    case: Any, problem: ContactProblem, tags: Mapping[str, Any]
+) -> Iterator[dict[str, Any]]:
+    """Yield the parts of the contact, one for each table; collective.
+
+    Each goes by its name, or by those of its groups.
+    """
+    surface = problem.surface
+    tables = case.nodes.get("contact", ())
+    nodes = tables if isinstance(tables, tuple) else (tables,)
+
+    # The points of the whole surface, on all ranks, are those of one table after the other.
+    whole = surface.whole()
+    parts = getattr(surface, "parts", ())
+    ends = np.cumsum([0, *(round(total(surface.comm, len(part.slots))) for part in parts)])
+    laws = case.list_friction()
+    for number, (node, (a, b)) in enumerate(zip(nodes, pairwise(ends), strict=True)):
+        groups = [inner.name for inner in walk_nodes(node) if isinstance(inner, Group)]
+        census = surface.censuses[number] if len(surface.censuses) == len(parts) else None
+        yield {
+            "name": node.arguments.get("name") or " on ".join(groups),
+            "points": int(b - a),
+            "size": float(whole.weights[a:b].sum()),
+            "gaps": _find_gaps(whole.gap0[a:b]),
+            "held": bool(node.arguments.get("roller", False)),
+            "friction": repr(laws[number]),
+            "mu": find_mu(laws[number]),
+            "nodes": "" if census is None else census.in_words(),
+            "places": whole.points[a:b],
+            "others": {} if census is None else census.places,
+            "sides": _describe_sides(problem.system.space, tags, groups, whole.points[a:b]),
+        }
+
+
+def _find_gaps(gaps: Array) -> list[float]:
+    """Return the least and the largest finite gap of points [m]; [] without any."""
+    finite = gaps[np.isfinite(gaps)]
+    return [float(finite.min()), float(finite.max())] if len(finite) else []
+
+
+def describe_contact_point(body: Body, problem: ContactProblem) -> dict[str, Any]:
+    """Return the contact point of a body without a mesh, at which pressures are forces."""
+    return {
+        "name": body.point,
+        "points": 1,
+        "gap": float(problem.surface.gap0[0]),
+        "friction": repr(problem.friction),
+        "nodes": "",
+        "places": problem.surface.whole().points,
+        "others": {},
+        "sides": [],
+    }
+
+
+def describe_layer(law: Any) -> dict[str, float]:
+    """Return what there is to tell of a layer; its speed is V, at which restitution is wanted."""
+    width = law.layer.width
+    speed = law.layer.v
+    return {"width": width, "speed": speed, "passage": width / speed}
+
+
+def _describe_sides(
+    space: Any, tags: Mapping[str, Any], names: Sequence[str], points: Array
+) -> list[dict[str, Any]]:
+    """Return (name, mean edge h [m], shear modulus G [Pa]) of both sides of a pair.
+
+    They are those of their facets that are no further from the box of the contact points than an
+    edge; there are none where a table has no two groups of facets.
+    """
+    sides = [tags[name] for name in names if isinstance(tags.get(name), Facets)]
+    if len(sides) != 2 or len(names) != 2 or not len(points):
+        return []
+    descriptions: list[dict[str, Any]] = []
+    for side in sides:
+        middles, edges, cells = facets_with_cells(space.mesh, side.indices)
+        slack = largest(space.comm, edges.max(initial=0.0))
+        near = np.all(
+            (middles >= points.min(axis=0) - slack) & (middles <= points.max(axis=0) + slack),
+            axis=1,
+        )
+        shear = space.forms.cellwise("shear")[cells[near]]
+        count, h, G = space.comm.sum(np.array([near.sum(), edges[near].sum(), shear.sum()]))
+        facets = max(count, 1.0)
+        descriptions.append({"name": side.name, "h": h / facets, "G": G / facets})
+    return descriptions
