@@ -125,7 +125,7 @@ def linear_step(report: Any, scheme: Any, dt: float) -> float:
     stage = scheme.stage(problem, old, dt)
     step = pose(problem, stage, A)
     result = vc.StepResult(A.factor.solve(step.b), none, none > 0.0, 0, "linear")
-    scheme.finish(problem, old, stage, complete(stage, step, result, A @ result.x), dt)
+    scheme.finish(problem, old, stage, complete(stage, step, result), dt)
     return time.perf_counter() - begin
 
 

@@ -252,7 +252,7 @@ class Linear:
         stage = SCHEME.stage(self.problem, self.state, self.dt)
         step = pose(self.problem, stage, self.A)
         result = vc.StepResult(factor.solve(step.b), self.none, self.none > 0.0, 0, "linear")
-        answer = complete(stage, step, result, self.A @ result.x)
+        answer = complete(stage, step, result)
         return SCHEME.finish(self.problem, self.state, stage, answer, self.dt)
 
     def fastest(self) -> str:

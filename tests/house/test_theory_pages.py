@@ -118,8 +118,8 @@ def solved_step(figures: ModuleType) -> list[str]:
     )
     A, b, (x, y), r = (
         np.column_stack([report.step.A @ e for e in np.eye(2)]),
-        report.step.b,
-        report.result.x,
+        figures.find_whole_step(report.step).b,
+        report.new.u,
         report.result.r_n,
     )
     free = 1e3 * np.linalg.solve(A, b)

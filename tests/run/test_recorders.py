@@ -141,7 +141,7 @@ def test_v9_7_defect_sees_a_wrong_step(wrong: str) -> None:
     elif wrong == "reaction":
         balance = replace(balance, r_n=1.001 * balance.r_n)
     else:
-        balance = replace(balance, forces=1.001 * balance.forces)
+        balance = replace(balance, u=1.001 * balance.u)
     recorder.start(problem, report.old)
     assert (
         abs(recorder.row(replace(report, averages=lambda: balance))["energy_defect"]) > 1e-7 * size

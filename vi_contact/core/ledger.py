@@ -128,7 +128,7 @@ def energy_balance(
         damping = du·C v
         contact = r_n·B_n du    (work lost to the support, stored or dissipated there)
         friction = r_t·B_t du
-        algorithmic = du·(M a + K u) - ½(v0 + v1)·M (v1 - v0) - ½(K u0 + K u1)·du
+        algorithmic = du·M a - ½(v0 + v1)·M (v1 - v0) + du·K u - ½(u0 + u1)·K du
 
     algorithmic is 0 for the midpoint rule, and change is the difference of the energies themselves,
     so the defect measures the equation of motion. Collective.
@@ -139,7 +139,8 @@ def energy_balance(
         new: the state after it, before the impact law.
         balance: the equation of motion that the step satisfied.
         before: the energies of ``old``, when they are known.
-        after: those of ``new``. With both, no product is left, one with damping.
+        after: those of ``new``. With both, one product is left with damping, and one where a is not
+            (v1 - v0)/dt.
     """
     system = problem.equations
     surface = problem.surface
@@ -157,21 +158,33 @@ def energy_balance(
     if system.C is not None:
         damping = float(du.dot(system.C @ balance.v))
 
-    # One reduction adds them up over the ranks, and five inner products with them: the work of
-    # loads, that of M a + C v + K u, the changes of kinetic and of strain energy (as M and K are
-    # symmetric, a mean times a difference), and the work of normal reactions.
+    # The work of inertia is that of the change of momentum, which is known, where the scheme says
+    # so; else M a is one product more. The work of K (u - ½(u0 + u1)) on du needs none, as K is
+    # symmetric and K du is known.
+    gained = after.momentum - before.momentum
+    if balance.of_momentum is None:
+        inertial = (du, system.M @ balance.a)
+    else:
+        inertial = (du / balance.of_momentum, gained)
+    if balance.internal is None:
+        elastic = (balance.u - 0.5 * (old.u + new.u), after.elastic - before.elastic)
+    else:
+        elastic = (balance.internal, du)
+
+    # One reduction adds them up over the ranks, and others with them: the work of loads, the change
+    # of kinetic energy, and the work of normal reactions.
     works = _dot_pairs(
         system,
         (du, balance.f),
-        (du, balance.forces),
-        (0.5 * (old.v + new.v), after.momentum - before.momentum),
-        (0.5 * (before.elastic + after.elastic), du),
+        inertial,
+        (0.5 * (old.v + new.v), gained),
+        elastic,
         (balance.r_n, surface.normal_values(du)),
         sums=(rubbing, pushing, dragging, damping),
     )
-    loading, inner, kinetic, strain, pressing, rubbing, pushing, dragging, damping = works
-    if system.internal is not None:
-        strain = after.strain - before.strain
+    loading, inertia, kinetic, stiffness, pressing, rubbing, pushing, dragging, damping = works
+    if balance.internal is not None:
+        stiffness -= after.strain - before.strain
 
     # The support takes what reactions do on the motion relative to it. What they do on its own
     # motion is input.
@@ -181,7 +194,7 @@ def energy_balance(
         damping=damping,
         contact=pressing + pushing,
         friction=rubbing + dragging,
-        algorithmic=inner - damping - kinetic - strain,
+        algorithmic=inertia - kinetic + stiffness,
     )
 
 

@@ -24,14 +24,14 @@ makes the equation of motion that the ledger reads. Vectors may also be rows (k,
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from .algebra import Array, EffectiveMatrix, Mask, Matrix
 from .problem import ContactProblem
-from .step import Balance, StepProblem, StepResult
+from .step import Balance, State, StepProblem, StepResult
 from .system import SemiDiscreteSystem
 
 
@@ -81,6 +81,7 @@ class Stage:
             None where this balance is the mean one but for its weight.
         old: (share, u0) where the displacement of the stage is a sum share u0 + x over both ends,
             at each of which the internal force of a body that is not linear is taken.
+        of_momentum: whether the mean acceleration of the step is (v1 - v0)/dt.
     """
 
     guess: Array
@@ -99,6 +100,7 @@ class Stage:
     weight: float = 1.0
     before: Callable[[], Balance] | None = None
     old: tuple[float, Array] | None = None
+    of_momentum: bool = True
 
     def find_internal(self, system: SemiDiscreteSystem, d: Array | None = None) -> Array:
         """Return the internal force (n,) [N] of the balance at an increment; None for zero.
@@ -127,7 +129,6 @@ class Answer:
         r_n: normal reactions (m,) [N].
         r_t: tangential reactions (m, d - 1) [N]; None without friction.
         active: (m,) True for closed conditions.
-        image: A d (n,), ``scale`` times newtons.
     """
 
     x: Array
@@ -135,7 +136,6 @@ class Answer:
     r_n: Array
     r_t: Array | None
     active: Mask
-    image: Array
 
 
 def make_matrix(
@@ -227,7 +227,7 @@ def pose(
     )
 
 
-def complete(stage: Stage, step: StepProblem, result: StepResult, image: Array) -> Answer:
+def complete(stage: Stage, step: StepProblem, result: StepResult) -> Answer:
     """Return the answer for x, with reactions in newtons.
 
     Rounding of guess + d must not open a closed point or move one that sticks: where d is on its
@@ -237,7 +237,6 @@ def complete(stage: Stage, step: StepProblem, result: StepResult, image: Array) 
         stage: the balance.
         step: what ``pose`` made of it.
         result: the answer of a solver, for d.
-        image: A d (n,).
     """
     surface = step.surface
     d = result.x
@@ -254,39 +253,47 @@ def complete(stage: Stage, step: StepProblem, result: StepResult, image: Array) 
     if stage.scale != 1.0:
         r_n = r_n / stage.scale
         r_t = None if r_t is None else r_t / stage.scale
-    return Answer(x, d, r_n, r_t, result.active, image)
+    return Answer(x, d, r_n, r_t, result.active)
 
 
-def average(problem: ContactProblem, stage: Stage, step: StepProblem, answer: Answer) -> Balance:
+def average(
+    problem: ContactProblem, stage: Stage, answer: Answer, old: State, new: State
+) -> Balance:
     """Return the mean equation of motion of a step, for the energy ledger.
+
+    What the states say counts, where the scheme promises that a is the rate of their velocities:
+    a state that does not fit to its step then leaves a defect in the ledger.
 
     Args:
         problem: the problem that is marched.
         stage: the balance.
-        step: what ``pose`` made of it.
         answer: of the step.
+        old: the state that the step began with.
+        new: the state at its end, before the impact law.
     """
     surface = problem.surface
+    system = problem.equations
     r_n = answer.r_n
     r_t = answer.r_t
     if stage.carried is not None:
         r_n = r_n + surface.normal_values(stage.carried)
         if r_t is not None:
             r_t = r_t + surface.tangential_values(stage.carried)
-
-    # M a + C v + K u: those at the guess, which are the loads less what was left for the step, and
-    # those that the increment adds, which the certificate has made.
-    loads = stage.load if stage.carried is None else stage.load - stage.carried
-    forces = loads + (answer.image - step.b) / stage.scale
+    internal = None
+    if system.internal is not None:
+        internal = stage.find_internal(system, answer.d)
     balance = Balance(
         u=stage.u(answer.d),
         v=stage.v(answer.d),
         a=stage.a(answer.d),
         f=stage.load,
         r_n=r_n,
-        forces=forces,
         r_t=r_t,
+        internal=internal,
     )
-    if stage.weight == 1.0:
+    if stage.weight != 1.0:
+        balance = balance.weigh(stage.weight, None if stage.before is None else stage.before())
+    if not stage.of_momentum:
         return balance
-    return balance.weigh(stage.weight, None if stage.before is None else stage.before())
+    dt = stage.t - old.t
+    return replace(balance, a=(new.v - old.v) / dt, of_momentum=dt)

@@ -284,8 +284,10 @@ class Balance:
         a: averaged acceleration (n,) [m/s²].
         f: averaged load (n,) [N].
         r_n: averaged normal reactions (m,) [N].
-        forces: M a + C v + K u (n,) [N], of the arrays that the solver and the certificate used.
         r_t: averaged tangential reactions (m, d - 1) [N]; None without friction.
+        internal: averaged internal force (n,) [N] of a body that is not linear; None: K u.
+        of_momentum: dt [s] where a is (v1 - v0)/dt of the states, so that M a dt is the change of
+            their momentum; None where it is not.
     """
 
     u: Array
@@ -293,8 +295,9 @@ class Balance:
     a: Array
     f: Array
     r_n: Array
-    forces: Array
     r_t: Array | None = None
+    internal: Array | None = None
+    of_momentum: float | None = None
 
     def weigh(self, weight: float, other: "Balance | None" = None) -> "Balance":
         """Return weight times this equation, plus 1 - weight times another one.
@@ -304,8 +307,9 @@ class Balance:
             other: the other one, in which missing tangential reactions count as zero; None: none
                 is added.
         """
-        values: dict[str, Any] = {}
-        for name, value in vars(self).items():
+        values: dict[str, Any] = {"of_momentum": self.of_momentum}
+        for name in ("u", "v", "a", "f", "r_n", "r_t", "internal"):
+            value = getattr(self, name)
             mean = None if value is None else weight * value
             also = None if other is None else getattr(other, name)
             if mean is not None and also is not None:

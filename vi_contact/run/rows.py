@@ -144,7 +144,7 @@ def split_balance(many: Callable[[], Balance], row: int) -> Balance:
     """
     values: dict[str, Any] = {}
     for name, value in vars(many()).items():
-        values[name] = None if value is None else value[row]
+        values[name] = value[row] if isinstance(value, np.ndarray) else value
     return Balance(**values)
 
 

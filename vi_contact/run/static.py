@@ -249,7 +249,7 @@ class Equilibria:
         """
         stage = self._pose_stage(old, t)
         step, certified = solver.solve(stage)
-        answer = complete(stage, step, certified.result, certified.image)
+        answer = complete(stage, step, certified.result)
         rest = np.zeros_like(old.u)
         return State(
             t,

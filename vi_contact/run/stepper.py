@@ -201,7 +201,7 @@ class Stepper:
             stage, step, certified = self._solve_linear(stage, state, dt)
         else:
             step, certified = self._solve_nonlinear(stage, dt)
-        answer = complete(stage, step, certified.result, certified.image)
+        answer = complete(stage, step, certified.result)
 
         # Displacements and velocities at its end: of the scheme, then of the impact law.
         with together_if_own(surface.comm, scheme):
@@ -219,7 +219,7 @@ class Stepper:
             result=certified.result,
             certificate=certified.certificate,
             # formed only if some recorder asks for it
-            averages=partial(average, problem, stage, step, answer),
+            averages=partial(average, problem, stage, answer, state, free),
             escalated=certified.escalated,
         )
 

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.algebra import Array, freeze
+from ..core.algebra import freeze
 from ..core.errors import InputError, ViContactError
 from ..core.stage import Answer, Stage, average, complete, make_matrix, pose
 from ..core.step import Balance, Report, State, StepProblem, StepResult
@@ -254,15 +254,15 @@ class Group:
         parts = {"step": steps, "result": LazyRows(answers.own)}
         leaving = list(answers.failed)
         if not leaving:
-            result, image, leaving = self._judge(many, answers.rows, parts)
+            result, leaving = self._judge(many, answers.rows, parts)
         if not leaving:
-            self._finish(stage, many, complete(stage, many, result, image), parts, dt)
+            self._finish(stage, many, complete(stage, many, result), parts, dt)
         return [runs[row] for row in leaving]
 
     def _judge(
         self, many: StepProblem, rows: StepResult, parts: dict[str, Any]
-    ) -> tuple[StepResult, Array, list[int]]:
-        """Return the answers and A d as rows, and the rows of runs that have to escalate, or fail.
+    ) -> tuple[StepResult, list[int]]:
+        """Return the answers as rows, and the rows of runs that have to escalate, or fail.
 
         Answers that are not good at once are found alone.
 
@@ -273,8 +273,7 @@ class Group:
         """
         steps = parts["step"]
         results = parts["result"]
-        image = many.A @ rows.x
-        certificates = kkt_residuals(many, rows, lambda row: (steps[row], results[row]), image)
+        certificates = kkt_residuals(many, rows, lambda row: (steps[row], results[row]))
         doubtful = [
             row
             for row, certificate in enumerate(certificates)
@@ -287,7 +286,6 @@ class Group:
                 certified = self._solver.solve(steps[row])
                 results[row] = certified.result
                 certificates[row] = certified.certificate
-                image[row] = certified.image
                 escalated = certified.escalated
             if escalated:
                 leaving.append(row)
@@ -301,7 +299,7 @@ class Group:
                 r_t=None if rows.r_t is None else np.stack([result.r_t for result in own]),
             )
         parts["certificate"] = certificates
-        return rows, image, leaving
+        return rows, leaving
 
     def _finish(
         self, stage: Stage, many: StepProblem, answer: Answer, parts: dict[str, Any], dt: float
@@ -318,13 +316,14 @@ class Group:
         problems = self._problems
         scheme = self._scheme
         old = self._states
-        rows = scheme.finish(self._problem, self._many, stage, answer, dt)
+        before = self._many
+        rows = scheme.finish(self._problem, before, stage, answer, dt)
         for vector in (rows.u, rows.v, *rows.memory.values()):
             freeze(vector)  # the states of the runs are views of them
         free = split_states(rows)
         self._many, self._states = self._apply_impact(rows, free, dt)
         system = self._problem.equations
-        whole = cache(partial(average, self._problem, stage, many, answer))
+        whole = cache(partial(average, self._problem, stage, answer, before, rows))
         momenta = cache(lambda: system.M @ rows.v)
         forces = cache(lambda: system.K @ rows.u)
 

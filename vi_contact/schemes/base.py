@@ -102,6 +102,7 @@ def position_stage(
     weight: float = 1.0,
     before: Callable[[], Balance] | None = None,
     old: tuple[float, Array] | None = None,
+    of_momentum: bool = True,
 ) -> Stage:
     """Return the stage of a step in x = u1, with gap and slip at the end of the step.
 
@@ -121,6 +122,7 @@ def position_stage(
         before: makes the balance at the beginning, with the weight 1 - ``weight``; None for none.
         old: (share, u0) where u is a sum share u0 + u1 over both ends; None where it is no such
             sum.
+        of_momentum: whether the mean acceleration of the step is (v1 - v0)/dt.
 
     Returns:
         The stage: bound is the gap (m,) [m] of the undeformed body at the end, slip is measured
@@ -144,6 +146,7 @@ def position_stage(
         weight=weight,
         before=before,
         old=old,
+        of_momentum=of_momentum,
     )
 
 

@@ -146,6 +146,7 @@ class AlphaStep(BalanceStep, ABC):
             weight=self._weigh_end(),
             before=self._look_back(problem, state),
             old=old,
+            of_momentum=False,
         )
 
     def _weigh_end(self) -> float:
@@ -203,18 +204,17 @@ def balance_at(problem: ContactProblem, state: State, level: str = "") -> Balanc
     surface = problem.surface
     system = problem.equations
     reaction = state.memory[f"reaction{level}"]
-    a = state.memory[f"a{level}"]
-    forces = system.M @ a + system.internal_force(state.u)
-    if system.C is not None:
-        forces += system.C @ state.v
+    internal = None
+    if system.internal is not None:
+        internal = system.internal_force(state.u)
     return Balance(
         u=state.u,
         v=state.v,
-        a=a,
+        a=state.memory[f"a{level}"],
         f=problem.equations.load_at(state.t),
         r_n=surface.normal_values(reaction),
-        forces=forces,
         r_t=surface.tangential_values(reaction) if problem.frictional else None,
+        internal=internal,
     )
 
 

@@ -262,6 +262,7 @@ class LinearMultistep(BalanceStep):
             load=problem.equations.load_at(state.t + dt),
             weight=0.5,
             before=partial(balance_at, problem, state, "_0"),
+            of_momentum=False,
         )
 
     def finish(

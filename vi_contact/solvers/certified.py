@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.algebra import Array, EffectiveMatrix
+from ..core.algebra import EffectiveMatrix
 from ..core.certificate import Certificate
 from ..core.checks import on_all
 from ..core.collective import together_if_own
@@ -38,13 +38,11 @@ class Certified:
         result: the answer.
         certificate: below the tolerance.
         escalated: whether it is by a method that was escalated to.
-        image: A x (n,), of which the certificate was made.
     """
 
     result: StepResult
     certificate: Certificate
     escalated: bool
-    image: Array
 
 
 class CertifiedSolver:
@@ -119,20 +117,16 @@ class CertifiedSolver:
             except StepFailure as failure:
                 failures.append(str(failure))
                 continue
-            image = step.A @ result.x
-            certificate = kkt_residual(step, result, image)
+            certificate = kkt_residual(step, result)
 
             # Round-off that comes near the tolerance is corrected; larger residuals have causes
             # that no correction removes, and no solver is asked for more than it aims at.
             goal = NEAR * self._tolerance
             if max(goal, result.aim) < certificate.worst < FAR:
                 solve = self._get(place).solve
-                first = result
                 result, certificate = correct(step, result, certificate, solve, goal)
-                if result is not first:
-                    image = step.A @ result.x
             if certificate.worst <= self._tolerance:
-                return Certified(result, certificate, place > 0, image)
+                return Certified(result, certificate, place > 0)
             failures.append(f"{result.method}: {certificate}")
         raise StepFailure(
             f"step {step.k} at t = {step.t:.6g} s stayed above the certificate tolerance "

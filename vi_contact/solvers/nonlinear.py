@@ -365,7 +365,7 @@ class NonlinearSolver:
             best.certificate.worst,
         )
         result = replace(best.result, iterations=count)
-        return Certified(result, best.certificate, escalated, whole.b - best.rest)
+        return Certified(result, best.certificate, escalated)
 
 
 def _count_passes_of_a_factor(problem: ContactProblem) -> float:
