@@ -358,7 +358,7 @@ def certificate(path: Path) -> list[str]:
 
 
 def find_whole_step(step: vc.StepProblem) -> vc.StepProblem:
-    """Return a step for x itself, as pages write it, of one that a scheme poses for an increment."""
+    """Return the step for x itself, as pages write it, of one that is posed for an increment."""
     origin = step.origin
     return replace(
         step,

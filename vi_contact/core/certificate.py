@@ -12,9 +12,10 @@ class Certificate:
         equilibrium: |A x - b + B_nᵀ r_n|_max over the largest of |b|, |A x|, |K u| and
             1e-5 |A_ii| |x|. In a step of a scheme x is an increment and b what is left of the
             forces at the guess (``core.stage``), of which K u is the internal one; so the residual
-            is M a + C v + K u - f + Bᵀ r in the forces of the step themselves. The last term matters on fine meshes only, where the parts of A x cancel: it keeps the
-            rounding errors of the residual itself (1e-16 |A||x|) below the tolerance; what passes
-            at 1e-9 is then at most 1e-14 |A||x|.
+            is M a + C v + K u - f + Bᵀ r in the forces of the step themselves. The last term
+            matters on fine meshes only, where the parts of A x cancel: it keeps the rounding errors
+            of the residual itself (1e-16 |A||x|) below the tolerance; what passes at 1e-9 is then
+            at most 1e-14 |A||x|.
         penetration: max(-gap, 0) / x_ref.
         tension: max(-r_n, 0) / r_ref.
         complementarity: max |gap| / x_ref over active and bilateral conditions, max |r_n| / r_ref
@@ -28,8 +29,8 @@ class Certificate:
             displacement holds: nodal residuals may be small and add up.
 
     The references are maxima over all unknowns, so that a wide gap blunts no residual:
-    x_ref = max(|x|, |guess|), r_ref = max(|b|, |K u|, |r_n|), t_ref = max(limit, |r_t|, 1e-10 r_ref) and
-    s_ref = max(|slip|, 1e-5 x_ref): a step slides a small part of the way and rubs with a small
+    x_ref = max(|x|, |guess|), r_ref = max(|b|, |K u|, |r_n|), t_ref = max(limit, |r_t|,
+    1e-10 r_ref) and s_ref = max(|slip|, 1e-5 x_ref): a step slides a small part of the way and rubs with a small
     part of the inertia.
     """
 
