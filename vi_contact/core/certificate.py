@@ -30,8 +30,8 @@ class Certificate:
 
     The references are maxima over all unknowns, so that a wide gap blunts no residual:
     x_ref = max(|x|, |guess|), r_ref = max(|b|, |K u|, |r_n|), t_ref = max(limit, |r_t|,
-    1e-10 r_ref) and s_ref = max(|slip|, 1e-5 x_ref): a step slides a small part of the way and rubs with a small
-    part of the inertia.
+    1e-10 r_ref) and s_ref = max(|slip|, 1e-5 x_ref): a step slides a small part of the way and rubs
+    with a small part of the inertia.
     """
 
     equilibrium: float
