@@ -35,7 +35,7 @@ SCHEMES = [HALF, SS22(0.6, 0.7), NEWMARK]
 
 def test_initial_penetration_is_refused():
     with pytest.raises(
-        InputError, match=r"penetrates the obstacle by 0.002 m: reduce it or enlarge the gap"
+        InputError, match=r"penetrates the obstacle by 0.002 m: reduce it, enlarge the gap, or"
     ):
         next(run(chain_problem(3, gap=0.01, u0=[0.0, 0.0, 0.012]), HALF, dt=0.1, steps=1))
     with pytest.raises(InputError, match="penetrates"):

@@ -107,7 +107,7 @@ def test_no_steps() -> None:
         solution.facts["seconds_per_linear_step"]
     )
     assert (
-        "0 steps" in solution.summary()
+        "without a step" in solution.summary()
         and json.loads(to_json(solution.facts))["seconds_per_step"] is None
     )
 
