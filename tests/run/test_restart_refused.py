@@ -242,6 +242,21 @@ def test_crafted_checkpoints_are_told(old: Path, tmp_path: Path, name: str) -> N
 
 
 @serial
+@pytest.mark.parametrize(
+    ("number", "sentence"),
+    [(1, r"is of version 0\.2, .*: start a new run; report and plot"), (99, "has format 99")],
+)
+def test_states_of_other_versions_are_told(
+    old: Path, tmp_path: Path, number: int, sentence: str
+) -> None:
+    """The folder of version 0.2 is read, and its states are not gone on from."""
+    (tmp_path / "checkpoint.npz").write_bytes((old / "checkpoint.npz").read_bytes())
+    crafted(tmp_path, lambda arrays: _about(arrays, format=number))
+    with pytest.raises(InputError, match=sentence):
+        run(None, 25, restart=tmp_path, **PLAIN)
+
+
+@serial
 def test_checksum_sees_everything() -> None:
     """Names, types, shapes and values."""
     one = {"a": np.arange(4.0), "b": np.array("text")}

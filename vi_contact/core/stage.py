@@ -195,13 +195,14 @@ def pose(
     surface = problem.surface
 
     # Forces at the guess. Accelerations are often zero there, by the choice of the guess.
-    force = stage.load.copy() if stage.carried is None else stage.load - stage.carried
+    internal = stage.find_internal(system)
+    force = stage.load - internal
+    if stage.carried is not None:
+        force -= stage.carried
     if stage.a.at_guess is not None:
         force -= system.M @ stage.a.at_guess
     if system.C is not None and stage.v.at_guess is not None:
         force -= system.C @ stage.v.at_guess
-    internal = stage.find_internal(system)
-    force -= internal
     if stage.scale != 1.0:
         force *= stage.scale
 
@@ -215,7 +216,7 @@ def pose(
         bound=stage.bound - surface.normal_values(stage.guess),
         surface=surface,
         scale=stage.scale,
-        guess=np.zeros_like(stage.guess),
+        guess=np.zeros(stage.guess.shape),
         active=stage.active,
         t=stage.t,
         k=stage.k,
@@ -241,8 +242,8 @@ def complete(stage: Stage, step: StepProblem, result: StepResult) -> Answer:
     surface = step.surface
     d = result.x
     x = stage.guess + d
-    on_bound = surface.normal_values(d) == step.bound
-    if on_bound.any():
+    if result.active.any():
+        on_bound = surface.normal_values(d) == step.bound
         surface.put_normal(x, stage.bound, on_bound)
     if stage.slip0 is not None:
         sticks = surface.tangential_values(d) == step.slip0

@@ -43,11 +43,13 @@ from ...core.own_files import is_own, open_to_read
 from ...core.problem import ContactProblem
 from ...core.step import Scheme, State
 from ..time_steps import TimeSteps
-from .folder import CHECKPOINT, FORMAT, check_format
+from .folder import CHECKPOINT, check_format
 from .identity import FIXED, find_differences, identify
 
 log = logging.getLogger(__name__)
 Arrays = dict[str, Any]
+STATES = 2  # the number of the format of checkpoints, and that of version 0.2
+OLD_STATES = 1
 MEMORY = "memory_"  # how names of arrays of the scheme's memory begin
 CONTACT = ("r_n", "active", "r_t")  # arrays of the conditions
 LONGEST = 200  # characters of a foreign reason
@@ -123,7 +125,7 @@ def write_checkpoint(
     # json keeps floats to the last bit
     about = json.dumps(
         {
-            "format": FORMAT,
+            "format": STATES,
             **run_of,
             "rows": rows,
             "vectors": sorted(vectors),
@@ -317,7 +319,7 @@ def _read(file: Path, problem: ContactProblem) -> tuple[dict[str, Any], Arrays]:
         if is_of_machine(error):
             raise
         raise _describe_damage(file, str(error) or type(error).__name__) from error
-    check_format(file, about.get("format"))
+    _check_states(file, about.get("format"))
     try:
         _check_sizes(problem, about, arrays)
     except KeyError as error:
@@ -325,6 +327,23 @@ def _read(file: Path, problem: ContactProblem) -> tuple[dict[str, Any], Arrays]:
     except (InputError, TypeError) as error:
         raise _describe_damage(file, error) from error
     return about, arrays
+
+
+def _check_states(file: Path, number: Any) -> None:
+    """Raise InputError for a checkpoint whose states this version cannot go on from.
+
+    Args:
+        file: the checkpoint.
+        number: of its format.
+    """
+    if number == STATES and not isinstance(number, bool):
+        return
+    if number == OLD_STATES:
+        raise InputError(
+            f"the checkpoint '{file}' is of version 0.2, whose schemes kept other things in mind: "
+            "start a new run; report and plot still read the old one"
+        )
+    check_format(file, number)
 
 
 def _unpack(file: Path) -> tuple[dict[str, Any], Arrays]:

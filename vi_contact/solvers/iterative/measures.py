@@ -46,7 +46,10 @@ class StepMeasure:
         self._comm: Comm = step.surface.comm
         self._largest_entry = step.A.largest
         self._b = max_abs(load)
-        self._guess = max_abs(step.guess)
+        if step.internal is not None:
+            self._b = max(self._b, max_abs(step.internal))
+        self._guess = max_abs(step.guess if step.origin is None else step.origin)
+        self._is_increment = step.origin is not None
 
     def __call__(self, contact: ClosedSet, x: Array, residual: Array, load: Array) -> Measures:
         """Return the references at x. Collective.
@@ -67,9 +70,14 @@ class StepMeasure:
             ]
         )
         b, Ax, size, guess, reaction = self._comm.max(np.where(np.isnan(local), np.inf, local))
+        length = max(size, guess)
+
+        # The references of the certificate; rounding of A x is that of x alone, which may be an
+        # increment that is small beside the displacements.
         entries = self._largest_entry * size
-        force = max(b, Ax, ROUNDING * entries)
-        return Measures(force, max(b, reaction), max(size, guess), ROUND_OFF * max(entries, force))
+        of_certificate = self._largest_entry * length if self._is_increment else entries
+        force = max(b, Ax, ROUNDING * of_certificate)
+        return Measures(force, max(b, reaction), length, ROUND_OFF * max(entries, force))
 
 
 class Worth:
