@@ -20,7 +20,7 @@ from unittest.mock import patch
 import pytest
 from site_pages import ROOT, loaded
 
-from vi_contact.run.march import March
+from vi_contact.run.stepper import Stepper
 
 pytest.importorskip("dolfinx")
 pytestmark = [pytest.mark.slow, pytest.mark.serial]
@@ -33,7 +33,7 @@ def first_step(benchmark: Any) -> Any:
     def start_up(rounds: int) -> tuple[float, list[float]]:
         printed = io.StringIO()
         with (
-            patch.object(March, "_attempt", March._attempt),
+            patch.object(Stepper, "_attempt", Stepper._attempt),
             patch("os._exit", side_effect=SystemExit),
             patch.object(sys, "argv", ["-c", "run"]),
             contextlib.redirect_stdout(printed),
