@@ -135,7 +135,7 @@ def test_an_axis_has_one_quantity_of_one_size() -> None:
         "[kN m]",
     ]
     run = run_of(columns)
-    chosen = chart_histories(run, CHARTS, lambda name, unit: (1e-3, f"k{unit}/m"))
+    chosen = chart_histories(run, CHARTS, lambda name, unit, size: (1e-3, f"k{unit}/m"))
     assert chosen[0].y == "[kN/m]"
     assert np.array_equal(chosen[0].lines[0].y, 1e-3 * run.history["N_base"])
 

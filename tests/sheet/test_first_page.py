@@ -22,6 +22,7 @@ from vi_contact.practice.plots.report_numbers import ReportNumbers, read_slice
 from vi_contact.practice.plots.sections import Section
 from vi_contact.practice.sheet.choices import Sheet
 from vi_contact.practice.sheet.first_page import describe_first_page
+from vi_contact.practice.sheet.rigid_base import find_edge_pressure
 from vi_contact.practice.studies.report import report
 from vi_contact.run.files.reading import RunFolder, read_run
 
@@ -169,3 +170,27 @@ def test_wrong_sheets_are_refused(tmp_path: Path, table: str, words: str) -> Non
     with pytest.raises(InputError, match=words) as caught:
         report(folder, out=tmp_path / "page.pdf")
     assert "case.toml: [sheet" in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_a_rigid_base_stands_beside_the_pressure_of_an_edge(tmp_path: Path) -> None:
+    """By hand, a base of 4 m and 2 m thick: N/A (1 + 6 e/W) = 80/8 * 1.75 = 17.5 kPa for e = 0.5 m;
+    2 N/(3 t (W/2 - e)) = 160/(6 * 1) = 26.67 kPa for e = 1 m; N outside of the base has none."""
+    assert find_edge_pressure(80e3, -0.5, 4.0, 8.0) == pytest.approx(17.5e3)
+    assert find_edge_pressure(80e3, 1.0, 4.0, 8.0) == pytest.approx(80e3 / 3.0)
+    assert np.isnan(find_edge_pressure(80e3, 2.0, 4.0, 8.0))
+    columns = {
+        "N_base": ("N", "normal force", np.full(6, 80e3)),
+        "e_base": ("m", "eccentricity", np.array([0.0, 0.5, 0.5, 0.5, 0.5, 0.5])),
+        "pressure_low_base": ("Pa", "pressure", 1e3 * np.array([1.0, 2.0, 90.0, 2.0, 2.0, 2.0])),
+    }
+    run = read_run(write_run(tmp_path / "run", columns, dt=0.5))
+    part = {"name": "base", "size": 8.0}
+    section = {"type": "PlaneStrain", "thickness": 2.0}
+    model = {"dimension": 2, "section": section, "contact": [part]}
+    sheet = Sheet(numbers=["pressure_low_base"])
+    note = first_page(run, sheet, 2.0, model=model).notes[-1]
+    assert "At 1 s a rigid base on springs" in note and "has 17.5 kPa at its edge" in note
+    assert "N = 40 kN/m, e = 0.5 m, width 4 m" in note
+    for unknown in ({}, model | {"dimension": 3}, model | {"contact": [part | {"name": "x"}]}):
+        notes = first_page(run, sheet, 2.0, model=unknown).notes
+        assert not any("rigid base" in other for other in notes)

@@ -11,6 +11,7 @@ from ...run.files.reading import RunFolder
 from ..engineering.peak_values import column_of
 from .rules import WORDS, History, Measure, Rule, find_columns, list_rules
 
+FORCES = {"N": "normal force", "T": "shear", "M": "moment about the centre"}  # of parts
 NEARLY = 0.9  # of a peak: while a value is above, the peak lasts
 
 
@@ -114,7 +115,17 @@ def _take_column(name: str, run: RunFolder) -> DecidingNumber:
             Measure.SAFETY,
             history,
         )
-    return measure_column(_shorten_meaning(meaning), name, Measure.PEAK, history)
+    return measure_column(_name_column(name, meaning, run.history), name, Measure.PEAK, history)
+
+
+def _name_column(name: str, meaning: str, history: History) -> str:
+    """Return what a column is called on the page: forces of parts of the contact by their trade."""
+    kind, _, part = name.partition("_")
+    if kind not in FORCES or f"uplift_{part}" not in history:
+        return _shorten_meaning(meaning)
+    is_upright = np.isfinite(history.get(f"level_{part}", np.nan)).any()
+    word = "thrust" if kind == "N" and is_upright else FORCES[kind]
+    return f"{word}, part {part}"
 
 
 def _shorten_meaning(meaning: str) -> str:

@@ -320,7 +320,7 @@ def _compare(
     """
     size = _measure(peak)
     mark = ", raw: not convergent at impacts" if peak.quantity.endswith(GROWS) else ""
-    factor, unit = numbers.choose_unit(peak.name, peak.unit)
+    factor, unit = numbers.choose_unit(peak.name, peak.unit, size)
     row = [peak.name + mark, unit, write_number(factor * size)]
     for others in refined.values():
         other = _measure(others[peak.name]) if peak.name in others else np.nan

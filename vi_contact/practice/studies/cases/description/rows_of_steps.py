@@ -1,11 +1,19 @@
 """Write the rows of damping, periods, time steps and waves, and of the sides of a model."""
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from typing import Any
 
 from ....units.report_units import write_number
 from .pen import Model, Pen, Row, list_objects, say
+
+_LONG_NUMBER = re.compile(r"\d+\.\d{5,}(?:e-?\d+)?")  # as a program writes one
+
+
+def _shorten_number(found: re.Match[str]) -> str:
+    """Return a number of a text with the digits of a report."""
+    return write_number(float(found[0]))
 
 
 def list_damping(model: Model, pen: Pen) -> Iterator[Row]:
@@ -13,7 +21,7 @@ def list_damping(model: Model, pen: Pen) -> Iterator[Row]:
     if "damping" in model:
         # the ratios of the modes stand beside the periods below
         sources = [text for text in str(model["damping"]).split("; ") if " at T1 = " not in text]
-        yield say("law", "; ".join(sources))
+        yield say("law", _LONG_NUMBER.sub(_shorten_number, "; ".join(sources)))
     periods = model.get("periods") or []
     ratios = model.get("damping_ratios") or []
     for number, period in enumerate(periods, start=1):
