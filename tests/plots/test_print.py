@@ -286,8 +286,8 @@ def test_a_sketch_has_sizes_names_and_loads() -> None:
     assert not overlaps(box(axis.get_legend()), box(axis))
     legend = [one.get_text() for one in axis.get_legend().get_texts()]
     assert legend == [
-        "dam: E = 25 GPa, 2400 kg/m³",
-        "rock",
+        "dam: 10 × 20 m, E = 25 GPa, 2400 kg/m³",
+        "rock: 50 × 15 m",
         "fixed x, y: rock_bottom",
         "roller, fixed x: left_side",
         "contact: joint",

@@ -10,7 +10,7 @@ from ..units.report_units import ReportUnits, Written, choose_unit, write_number
 
 PERCENT = (100.0, "%")
 # Beginnings of columns that are places, and of columns that are shares of a whole.
-_PLACES = ("height_", "e_", "contact_x", "contact_y", "contact_z")
+PLACES = ("height_", "e_", "contact_x", "contact_y", "contact_z")
 _SHARES = ("uplift_", "contact_uplift", "friction_used", "contact_slipping", "margin_")
 
 
@@ -39,7 +39,7 @@ class ReportNumbers:
         if unit in ("N/m", "N m/m"):  # those of a metre already
             factor, name = choose_unit(unit.removesuffix("/m"), self.units, size=size)
             return factor, f"{name}/m"
-        quantity = "size" if unit == "m" and column.startswith(_PLACES) else ""
+        quantity = "size" if unit == "m" and column.startswith(PLACES) else ""
         return choose_unit(
             unit,
             self.units,

@@ -22,7 +22,7 @@ from . import charts
 from .charts import Chart
 from .histories import LEDGER
 from .maps import Drawing, list_maps
-from .report_numbers import ReportNumbers, read_slice
+from .report_numbers import PLACES, ReportNumbers, read_slice
 from .report_words import (
     CHARTS,
     HEADERS,
@@ -224,12 +224,14 @@ def _list_results(
 def find_scales(run: RunFolder) -> dict[str, float]:
     """Return SI unit -> the largest size of a number in the columns of this unit.
 
-    What is smaller than ``NOISE`` of it is rounding.
+    What is smaller than ``NOISE`` of it is rounding. Places do not count: they are metres where
+    displacements are micrometres.
     """
     scales: dict[str, float] = defaultdict(float)
     for name, (unit, _) in run.columns.items():
         values = run.history.get(name, np.array([]))
-        if values.ndim == 1 and not np.isnan(values).all():
+        is_measured = values.ndim == 1 and not np.isnan(values).all()
+        if is_measured and not name.startswith(PLACES):
             scales[unit] = max(scales[unit], float(np.nanmax(np.abs(values))))
     return scales
 

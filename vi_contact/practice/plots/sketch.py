@@ -55,7 +55,7 @@ WIDTH = 7.4
 HEIGHTS = (1.6, 6.0)
 LETTER = 0.07  # width of a letter in the picture [inches]
 INK = 0.65  # brightness of a name over that of what it names, which may be pale
-LONGEST = 48  # letters of a name in the legend, which would leave the model no room
+LONGEST = 56  # letters of a name in the legend, which would leave the model no room
 LEADER = np.array([-1.0, 0.6])  # direction in which the name of a slender body stands
 
 
@@ -125,7 +125,8 @@ def _draw_bodies(axis: Any, outline: Any, bodies: Sequence[Mapping[str, Any]]) -
         fill = FILLS[number % len(FILLS)]
         axis.add_patch(PathPatch(border.path, facecolor=fill, edgecolor="none", zorder=0.5))
         if number < len(bodies):
-            label = escape_dollars(_describe_body(bodies[number]))
+            sizes = np.ptp(np.concatenate(border.chains), axis=0)
+            label = escape_dollars(_describe_body(bodies[number], sizes))
             nowhere = np.full((1, 2), np.nan)
             axis.add_patch(Polygon(nowhere, facecolor=fill, edgecolor="0.3", label=label))
 
@@ -137,11 +138,11 @@ def _list_borders(outline: Any) -> Iterator[tuple[int, Border]]:
             yield int(part["region"]), chain_border(np.array(part["lines"], dtype=float))
 
 
-def _describe_body(body: Mapping[str, Any]) -> str:
-    """Return the name of a body, its stiffness and its density."""
+def _describe_body(body: Mapping[str, Any], sizes: Array) -> str:
+    """Return the name of a body, its width and height (2,) [m], stiffness and density."""
     material = body.get("material")
     numbers = material if isinstance(material, Mapping) else {}
-    words = []
+    words = [" × ".join(write_number(float(size)) for size in sizes) + " m"]
     E = numbers.get("E")
     if isinstance(E, int | float) and E > 0.0:
         factor, unit = scale(float(E), "Pa")
@@ -150,7 +151,7 @@ def _describe_body(body: Mapping[str, Any]) -> str:
     if isinstance(rho, int | float):
         words.append(f"{write_number(float(rho))} kg/m³")
     name = str(body.get("name", "body"))
-    return f"{name}: {', '.join(words)}" if words else name
+    return f"{name}: {', '.join(words)}"
 
 
 def _name_supports(

@@ -178,7 +178,8 @@ def _explain_convergence(
         )
     if refined:
         sentences.append(
-            f"Converged means: half the step changes the number by at most {100 * LIMIT:.0f} %. "
+            f"Converged means: half the step changes the number by at most {100 * LIMIT:.0f} %, "
+            "and it is no peak that lasts one step in both runs. "
             "If the error falls with the first power of the step, the error of a number here is "
             "twice its change."
         )
