@@ -91,6 +91,7 @@ _SMALLER = {
     "kN": ("N",),
     "kPa": ("Pa",),
     "mm": ("µm",),
+    "rad": ("µrad",),
 }
 _LEAST = {"modulus": 1.0, "mass": 1.0}
 _LEAST_OF_OTHERS = 1e-3
