@@ -193,7 +193,7 @@ def _read_model(
     try:
         model = read_object(folder / MODEL)
         inputs = input_tables(model, units)
-        image = render_image(sketch(model), bbox_inches="tight")
+        image = render_image(sketch(model, units), bbox_inches="tight")
     except InputError:
         raise
     except OSError as error:
