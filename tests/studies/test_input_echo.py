@@ -242,11 +242,12 @@ def test_points_of_attack_in_space() -> None:
 def test_the_report_has_the_rows_of_the_check(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Every row, and before the first figure."""
-    path = str(written(tmp_path))
+    """Every row, in the units of the sheet, and before the first figure."""
+    path = str(written(tmp_path, f'{DAM}[sheet]\nunits = {{force = "MN"}}\n'))
     out = tmp_path / "out"
     assert main(["run", path, "--check", "--quiet", "--out", str(tmp_path / "checked")]) == 0
     printed = capsys.readouterr().out
+    assert "MN/m" in printed and "kN" not in printed
     assert main(["run", path, "--quiet", "--out", str(out)]) == 0
     pages: list[Any] = []
     monkeypatch.setitem(
