@@ -1,17 +1,19 @@
-"""Run the shipped wall under a record at three time steps, for a table of docs/guide/by_hand.md.
+"""Run the shipped wall under a record, for two tables of docs/guide/by_hand.md.
 
     python3 docs/make_wall_steps.py elcentro.at2    # some minutes
     python3 docs/make_wall_steps.py                 # reads the run folders that are there
 
-The record is not part of the package. What is found is stored in docs/by_hand/steps.csv, from which
-docs/make_by_hand.py writes the table. Run folders are left in build/by_hand.
+The record is not part of the package. Each of three runs is repeated with half the time step, as
+``vi-contact report --halved`` does. What is found is stored in docs/by_hand/steps.csv, and page 1
+of the three reports in docs/by_hand/sheets.csv; docs/make_by_hand.py writes the tables. Run folders
+are left in build/by_hand.
 """
 
 from __future__ import annotations
 
 import csv
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +21,13 @@ import numpy as np
 from mpi4py import MPI
 
 from vi_contact.practice.studies import read_case
+from vi_contact.practice.studies.refinement import refine
 from vi_contact.run.files.reading import read_run
 
 ROOT = Path(__file__).resolve().parents[1]
 CASE = ROOT / "vi_contact" / "practice" / "studies" / "starters" / "wall.toml"
 STORED = ROOT / "docs" / "by_hand" / "steps.csv"
+SHEETS = ROOT / "docs" / "by_hand" / "sheets.csv"
 RUNS = ROOT / "build" / "by_hand"
 TIME_STEPS = (0.01, 0.005, 0.0025)  # s
 WINDOW = 0.02  # s, over which means are taken: two of the longest steps
@@ -73,21 +77,48 @@ def measure(history: Mapping[str, Any]) -> list[Row]:
     return rows
 
 
-def main() -> None:
-    """Run the wall at all time steps if a record is given, and store what is found."""
-    rows = []
+def read_sheet(out: Path) -> list[tuple[str, ...]]:
+    """Return (number, value, duration, dt/2) of page 1 of the report on a run, as it has them."""
+    from vi_contact.practice.studies.report import write_report
+
+    page = out / "page.pdf"
+    first = write_report(out, out=page).first
+    rows = [[cell.replace("\xa0", " ") for cell in row] for row in first.tables[0].rows]
+    return [(f"{row[0]}, `{row[1]}`", row[2], row[4], row[5]) for row in rows]
+
+
+def run_wall(record: Path) -> None:
+    """Run the wall at all time steps, and with half of each."""
     for dt in TIME_STEPS:
         out = RUNS / f"wall_{1e3 * dt:g}ms"
-        if len(sys.argv) > 1:
-            record = Path(sys.argv[1]).resolve()
-            settings = [f'excitation.1.record="{record}"', f"run.dt={dt}", "fields="]
-            read_case(CASE, settings).run(MPI.COMM_SELF, out=out, progress=False)
-        rows += [(dt, *row) for row in measure(read_run(out).history)]
+        settings = [f'excitation.1.record="{record}"', f"run.dt={dt}", "fields="]
+        read_case(CASE, settings).run(MPI.COMM_SELF, out=out, progress=False)
+        refine(out, MPI.COMM_SELF, names=["dt"], progress=False)
         print(f"{dt} s", flush=True)
-    with STORED.open("w", encoding="utf-8", newline="") as file:
+
+
+def store(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Store a table."""
+    with path.open("w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
-        table.writerow(["dt", "name", "unit", "value"])
-        table.writerows([dt, name, unit, f"{value:.8g}"] for dt, name, unit, value in rows)
+        table.writerow(header)
+        table.writerows(rows)
+
+
+def main() -> None:
+    """Run the wall at all time steps if a record is given, and store what is found."""
+    if len(sys.argv) > 1:
+        run_wall(Path(sys.argv[1]).resolve())
+    folders = {dt: RUNS / f"wall_{1e3 * dt:g}ms" for dt in TIME_STEPS}
+    shortest = TIME_STEPS[-1]
+    runs = folders | {0.5 * shortest: folders[shortest] / "refined" / "dt"}
+    steps = []
+    for dt, folder in runs.items():
+        found = measure(read_run(folder).history)
+        steps += [(dt, name, unit, f"{value:.8g}") for name, unit, value in found]
+    store(STORED, ["dt", "name", "unit", "value"], steps)
+    sheets = [(dt, *row) for dt, folder in folders.items() for row in read_sheet(folder)]
+    store(SHEETS, ["dt", "number", "value", "lasts", "halved"], sheets)
 
 
 if __name__ == "__main__":

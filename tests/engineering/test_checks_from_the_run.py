@@ -185,7 +185,7 @@ def test_newmark_takes_friction_or_yield_coefficient_from_the_run() -> None:
     assert heavy.inputs["mu"] == (pytest.approx(0.25, rel=1e-14), "-")
     assert heavy.notes[0].startswith("you gave weight = 1.2e+04 N, the run had 1e+04 N")
     own = NewmarkBlock(**given, one_sided=True, body="wall").compare(slid(), FACTS)
-    assert own.notes and "W = 10000 N" in own.notes[0]
+    assert own.notes and "W = 10 kN" in own.notes[0]
     typed = NewmarkBlock(**given, one_sided=True, mu=0.2).compare(slid(), FACTS)
     assert typed.notes[0].startswith("you gave mu (the yield coefficient) = 0.2, the run had 0.3")
     unknown = NewmarkBlock(**given).compare(slid())

@@ -135,7 +135,7 @@ def test_an_axis_has_one_quantity_of_one_size() -> None:
         "[kN m]",
     ]
     run = run_of(columns)
-    chosen = chart_histories(run, CHARTS, lambda name, unit: (1e-3, f"k{unit}/m"))
+    chosen = chart_histories(run, CHARTS, lambda name, unit, size: (1e-3, f"k{unit}/m"))
     assert chosen[0].y == "[kN/m]"
     assert np.array_equal(chosen[0].lines[0].y, 1e-3 * run.history["N_base"])
 
@@ -278,16 +278,16 @@ def test_a_sketch_has_sizes_names_and_loads() -> None:
     (axis,) = figure.axes
     texts = [one for one in axis.texts if one.get_text()]
     said = sorted(one.get_text() for one in texts)
-    names = ["35 m", "50 m", "dam", "joint", "left_side", "rock", "rock_bottom", "water"]
-    assert said == names
+    names = ["35 m", "50 m", "dam", "joint", "left_side", "rock", "rock_bottom"]
+    assert said == sorted([*names, "water: 2000 kN"])
     for one, other in combinations(texts, 2):
         boxes = [Text.get_window_extent(text) for text in (one, other)]
         assert not overlaps(*boxes), (one.get_text(), other.get_text())
     assert not overlaps(box(axis.get_legend()), box(axis))
     legend = [one.get_text() for one in axis.get_legend().get_texts()]
     assert legend == [
-        "dam: E = 25 GPa, 2400 kg/m³",
-        "rock",
+        "dam: 10 × 20 m, E = 25 GPa, 2400 kg/m³",
+        "rock: 50 × 15 m",
         "fixed x, y: rock_bottom",
         "roller, fixed x: left_side",
         "contact: joint",

@@ -100,7 +100,7 @@ def test_every_text_is_escaped_and_nothing_is_loaded(page: Path) -> None:
 
 def test_thirty_seconds_are_small_and_extremes_stay(tmp_path: Path) -> None:
     """30 s at 1 ms with 60 columns: below 10 MB, and every curve has the largest and smallest value
-    of its column."""
+    of its column, in millimetres."""
     random, count = np.random.default_rng(1), 30_001
     columns = {
         f"u_{axis}_p{k}": ("m", "displacement", random.standard_normal(count))
@@ -130,7 +130,7 @@ def test_thirty_seconds_are_small_and_extremes_stay(tmp_path: Path) -> None:
     for name, line in shown.items():
         assert len(line["x"]) <= 12_000
         for end in (np.min, np.max):
-            assert end(line["y"]) == pytest.approx(end(history[name]), rel=1e-4)
+            assert end(line["y"]) == pytest.approx(1e3 * end(history[name]), rel=1e-4)
         assert np.all(np.diff(line["x"]) > 0.0)
 
 

@@ -150,7 +150,8 @@ def test_named_numbers() -> None:
     found = choose_numbers(made_run(WALL), names)
     assert [number.value for number in found] == [7.0, 9.0, 1.0, 1.5]
     assert [number.short_name for number in found] == [*names[:3], "sliding that stays"]
-    assert found[0].name == "value of N_stem, part x" and not found[0].rule
+    assert found[0].name == "thrust, part stem" and not found[0].rule
+    assert choose_numbers(made_run(WALL), ["N_base"])[0].name == "normal force, part base"
     assert choose_numbers(made_run(WALL), ["u_x_top"])[0].name == "value of u_x_top"
 
 

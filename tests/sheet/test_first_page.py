@@ -22,6 +22,7 @@ from vi_contact.practice.plots.report_numbers import ReportNumbers, read_slice
 from vi_contact.practice.plots.sections import Section
 from vi_contact.practice.sheet.choices import Sheet
 from vi_contact.practice.sheet.first_page import describe_first_page
+from vi_contact.practice.sheet.rigid_base import find_edge_pressure
 from vi_contact.practice.studies.report import report
 from vi_contact.run.files.reading import RunFolder, read_run
 
@@ -87,8 +88,8 @@ def test_model_json_tells_of_the_slice() -> None:
 
 
 def test_convergence_is_measured_or_not_claimed(tmp_path: Path) -> None:
-    """Without a refined run nothing is claimed; with one 4 % pass and 6 % do not; a run that failed
-    is told. One step is named with what to do."""
+    """Without a refined run nothing is claimed; with one 4 % pass and 6 % do not, nor does a peak
+    that is as short as the step; a run that failed is told. One step is named with what to do."""
     run = made_run(tmp_path / "run")
     sheet = Sheet(numbers=["N_stem", "M_stem"])
     bare = " ".join(first_page(run, sheet, cost="the run took 12 s").notes)
@@ -96,8 +97,9 @@ def test_convergence_is_measured_or_not_claimed(tmp_path: Path) -> None:
     assert "Peak of one step: N_stem." in bare and "test it with `--halved`" in bare
     assert "Converged means" not in bare
     near = first_page(run, sheet, refined={"dt": made_run(tmp_path / "near", 1.04)})
-    assert rows(near)["N_stem"][3:] == ["yes: +4 %", "not tested"]
-    assert "Not converged" not in " ".join(near.notes)
+    assert rows(near)["M_stem"][3:] == ["yes: +4 %", "not tested"]
+    assert rows(near)["N_stem"][3] == "no: +4 %, still one step"
+    assert "Not converged: N_stem." in " ".join(near.notes)
     assert "Converged means: half the step changes the number by at most 5 %" in near.notes[1]
     far = first_page(
         run, sheet, refined={"dt": made_run(tmp_path / "far", 0.94)}, failed={"h": "no mesh"}
@@ -169,3 +171,41 @@ def test_wrong_sheets_are_refused(tmp_path: Path, table: str, words: str) -> Non
     with pytest.raises(InputError, match=words) as caught:
         report(folder, out=tmp_path / "page.pdf")
     assert "case.toml: [sheet" in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_a_rigid_base_stands_beside_the_pressure_of_an_edge(tmp_path: Path) -> None:
+    """By hand, a base of 4 m and 2 m thick: N/A (1 + 6 e/W) = 80/8 * 1.75 = 17.5 kPa for e = 0.5 m;
+    2 N/(3 t (W/2 - e)) = 160/(6 * 1) = 26.67 kPa for e = 1 m; N outside of the base has none."""
+    assert find_edge_pressure(80e3, -0.5, 4.0, 8.0) == pytest.approx(17.5e3)
+    assert find_edge_pressure(80e3, 1.0, 4.0, 8.0) == pytest.approx(80e3 / 3.0)
+    assert np.isnan(find_edge_pressure(80e3, 2.0, 4.0, 8.0))
+    columns = {
+        "N_base": ("N", "normal force", np.full(6, 80e3)),
+        "e_base": ("m", "eccentricity", np.array([0.0, 0.5, 0.5, 0.5, 0.5, 0.5])),
+        "pressure_low_base": ("Pa", "pressure", 1e3 * np.array([1.0, 2.0, 90.0, 2.0, 2.0, 2.0])),
+    }
+    run = read_run(write_run(tmp_path / "run", columns, dt=0.5))
+    part = {"name": "base", "size": 8.0}
+    section = {"type": "PlaneStrain", "thickness": 2.0}
+    model = {"dimension": 2, "section": section, "contact": [part]}
+    sheet = Sheet(numbers=["pressure_low_base"])
+    note = first_page(run, sheet, 2.0, model=model).notes[-1]
+    assert "At 1 s a rigid base on springs" in note and "has 17.5 kPa at its edge" in note
+    assert "N = 40 kN/m, e = 0.5 m, width 4 m" in note
+    for unknown in ({}, model | {"dimension": 3}, model | {"contact": [part | {"name": "x"}]}):
+        notes = first_page(run, sheet, 2.0, model=unknown).notes
+        assert not any("rigid base" in other for other in notes)
+
+
+def test_a_small_displacement_changes_beside_large_places(tmp_path: Path) -> None:
+    """1.5 µm more than 0.5 µm are no rounding, though the thrust acts 4 m above the ground."""
+    runs = []
+    for name, most in (("run", 5e-7), ("near", 2e-6)):
+        columns = {
+            "u_x_top": ("m", "displacement", most * np.array([0.0, 1.0, 1.0, 1.0, 0.0, 0.0])),
+            "height_stem": ("m", "height of the thrust", np.full(6, 4.0)),
+        }
+        runs.append(read_run(write_run(tmp_path / name, columns, dt=0.5)))
+    page = first_page(runs[0], Sheet(numbers=["u_x_top"]), refined={"dt": runs[1]})
+    assert rows(page)["u_x_top"][0] == "0.5 µm"
+    assert rows(page)["u_x_top"][3] == "no: +300 %"

@@ -204,7 +204,7 @@ def test_check_describes_a_beam(tmp_path, capsys):
     lines = [line.split() for line in said.splitlines()]
     assert ["tip:", "gap", "at", "the", "start", "50", "mm"] in lines
     assert ["tip:", "friction", "mu", "=", "0.3", "Coulomb"] in lines
-    assert ["beam:", "mass", "0.005", "t", "200", "cells"] in lines
+    assert ["beam:", "mass", "5", "kg", "200", "cells"] in lines
     assert ["start", "fixed", "along", "x,", "y"] in lines
     assert ["body_force", "20", "N/m", "20", "at", "the", "start,"] in [one[:7] for one in lines]
     assert (tmp_path / "run" / "model.png").stat().st_size > 0
@@ -217,7 +217,7 @@ def test_check_describes_a_beam(tmp_path, capsys):
 def test_check_describes_a_particle_and_warns_of_a_step_too_long_for_the_layer():
     model = describe(read_case(locate("layer"), ["run.dt=0.01"]), COMM)
     lines = [line.split() for line in put_in_words(model).splitlines()]
-    assert ["particle:", "mass", "0.001", "t"] in lines
+    assert ["particle:", "mass", "1", "kg"] in lines
     assert ["particle:", "gap", "at", "the", "start", "150", "mm"] in lines
     assert ["width", "of", "the", "layer", "50", "mm", "passed", "in", "0.05", "s"] in lines
     (warning,) = model["warnings"]

@@ -93,7 +93,7 @@ def test_numbers_of_two_blocks(shared_tmp: Path) -> None:
         ("fixed", ["lower_bottom"], ["x", "y"]),
         ("roller, fixed", ["lower_left"], ["x"]),
         ("roller, fixed", ["lower_right"], ["x"]),
-        ("Dashpots", ["upper_top"], ["x", "y"]),
+        ("dashpots", ["upper_top"], ["x", "y"]),
     ]
     (contact,) = free["contact"]
     assert contact["name"] == "upper_bottom on lower_top" and contact["points"] == 2
@@ -254,7 +254,9 @@ def test_a_sketch_shows_what_holds_and_touches(tmp_path: Path, d: int) -> None:
     (axis,) = sketch(model).axes
     names = [one.get_text() for one in axis.get_legend().get_texts()]
     letters = ", ".join("xyz"[:d])
-    bodies = ["lower: E = 1.8 GPa, 2000 kg/m³", "upper: E = 1.8 GPa, 2000 kg/m³"] if d == 2 else []
+    bodies = []
+    if d == 2:
+        bodies = [f"{one}: 0.25 × 2 m, E = 1.8 GPa, 2000 kg/m³" for one in ("lower", "upper")]
     assert names[: len(bodies)] == bodies
     assert names[len(bodies)] == f"fixed {letters}: lower_{'left' if d == 1 else 'bottom'}"
     assert names[-1].startswith("contact")

@@ -26,6 +26,8 @@ from vi_contact.practice.studies.cases.description.motions import (
     describe_design_spectrum,
     describe_records,
 )
+from vi_contact.practice.studies.cases.description.pen import Pen
+from vi_contact.practice.studies.cases.description.surroundings import describe_sides
 from vi_contact.practice.studies.cases.description.tables import input_tables, print_tables
 from vi_contact.practice.studies.report import WRITERS, report
 from vi_contact.practice.units.report_units import ReportUnits
@@ -240,11 +242,12 @@ def test_points_of_attack_in_space() -> None:
 def test_the_report_has_the_rows_of_the_check(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Every row, and before the first figure."""
-    path = str(written(tmp_path))
+    """Every row, in the units of the sheet, and before the first figure."""
+    path = str(written(tmp_path, f'{DAM}[sheet]\nunits = {{force = "MN"}}\n'))
     out = tmp_path / "out"
     assert main(["run", path, "--check", "--quiet", "--out", str(tmp_path / "checked")]) == 0
     printed = capsys.readouterr().out
+    assert "MN/m" in printed and "kN" not in printed
     assert main(["run", path, "--quiet", "--out", str(out)]) == 0
     pages: list[Any] = []
     monkeypatch.setitem(
@@ -423,3 +426,26 @@ def test_the_check_refuses_what_the_run_refuses(
     assert main([*command, "--check"]) == 1
     assert capsys.readouterr().err.splitlines()[-1] == of_run.splitlines()[-1]
     assert not (checked / "history.csv").exists() and not (checked / "case.toml").exists()
+
+
+def test_columns_of_a_frame_are_no_ground() -> None:
+    """Beams between columns: the columns fill a fifth of the box round them, soil fills its own."""
+    beams = {"name": "beams", "box": {"min": [1.0, 2.0], "max": [9.0, 3.0]}, "size": 8.0}
+    around = {"name": "around", "box": {"min": [0.0, 0.0], "max": [10.0, 4.0]}}
+    model = {
+        "dimension": 2,
+        "gravity": None,
+        "box": around["box"],
+        "waves": [{"body": "around", "c_s": 100.0}],
+        "records": [],
+    }
+    assert describe_sides(model | {"bodies": [beams, around | {"size": 8.0}]}) == {}
+    sides = describe_sides(model | {"bodies": [beams, around | {"size": 32.0}]})
+    assert sides["structure"] == ["beams"] and sides["ground"] == "around"
+
+
+def test_rounding_beside_a_component_is_zero() -> None:
+    """1e-16 m beside 2 m are none; what is small beside nothing is told."""
+    pen = Pen(ReportUnits(), None)
+    assert pen.row_of_several("c", [1e-16, 2.0], "m", quantity="size")[1] == "(0, 2)"
+    assert pen.row_of_several("c", [1e-16, 0.0], "m", quantity="size")[1] == "(1e-16, 0)"

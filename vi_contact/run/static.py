@@ -102,8 +102,8 @@ def _warn_if_open(problem: ContactProblem, state: State) -> None:
     if surface.comm.rank == 0:
         log.warning(
             "at rest at t = %g s %.3g %% of the contact area that touches at the start is open, "
-            "from %s on: loads that lift a body do that; so does a side 1 with smaller facets than "
-            "a softer side 2, which should be meshed as finely or be side 1",
+            "from %s on: the loads part the bodies there, as where fill leans away from a wall, "
+            "or a moment lifts the edge of a base",
             state.t,
             100.0 * lost / area,
             describe_point(place),

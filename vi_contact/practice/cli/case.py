@@ -264,9 +264,10 @@ def _check_model(case: "Case", comm: Any, folder: Path) -> str:
     model, ranks = examine(case, comm, folder)
     write_model(ranks, model, run_folder(ranks, folder))
     picture = folder / "model.png"
-    on_root(ranks, lambda: write_picture(sketch(model), picture, bbox_inches="tight"))
+    units = case.sheet.units
+    on_root(ranks, lambda: write_picture(sketch(model, units), picture, bbox_inches="tight"))
     if comm.rank == 0:
-        say(f"{put_in_words(model)}\npicture: {picture}")
+        say(f"{put_in_words(model, units)}\npicture: {picture}")
     if model["defects"]:
         raise InputError(f"{case.path}: {'; '.join(model['defects'])}")
     if comm.rank != 0:

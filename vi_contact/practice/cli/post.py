@@ -17,6 +17,8 @@ from ..engineering import (
     write_peaks,
 )
 from ..plots.records import plot_loop, plot_spectra, plot_transfer
+from ..plots.report_numbers import ReportNumbers
+from ..units.report_units import write_number
 from .options import add_actions, add_command, add_folder, space_numbers
 from .profile import add_profile
 from .tables import add_table, choose_table
@@ -348,9 +350,11 @@ def _describe_outcome(result: "Comparison") -> str:
     """Return both numbers and their ratio, or why they are not compared."""
     if result.applies:
         return f"does not apply: {result.applies}"
+    factor, unit = ReportNumbers().choose_unit("", result.unit, abs(result.found))
+    found = f"{write_number(factor * result.found)} {unit}".removesuffix(" -")
     outcome = (
-        f"expected {result.expected:.5g}, found {result.found:.5g} {result.unit}, "
-        f"ratio {result.ratio:.4g}"
+        f"expected {write_number(factor * result.expected)}, found {found}, "
+        f"ratio {write_number(result.ratio)}"
     )
     if math.isfinite(result.lasted):
         outcome += f", above 90 % of it for {result.lasted:.3g} s"
@@ -360,5 +364,6 @@ def _describe_outcome(result: "Comparison") -> str:
 def _list_inputs(result: "Comparison") -> str:
     """Return what a formula takes, with units."""
     return "; ".join(
-        f"{name} = {value:.6g} {unit}" for name, (value, unit) in result.inputs.items()
+        f"{name} = {value:.6g} {unit}".removesuffix(" -")
+        for name, (value, unit) in result.inputs.items()
     )

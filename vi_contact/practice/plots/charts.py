@@ -28,6 +28,7 @@ from .histories import (
     scale_values,
 )
 from .records import SAMPLES_A_PERIOD
+from .report_words import CHARTS_OF_THE_WHOLE
 
 # What is no more than this is nothing: a term of energy over the largest one, and the range of a
 # column over its size.
@@ -41,7 +42,7 @@ CURVES = 8  # of probes in an overview: beyond, nobody tells them apart
 SEEN = 0.1
 TITLE_PAD = 3.0  # points, between a legend and the title above it
 Run = Any  # a Solution, or a RunFolder, which needs h5py
-UnitChoice = Callable[[str, str], tuple[float, str]]
+UnitChoice = Callable[[str, str, float], tuple[float, str]]
 
 
 @dataclass(frozen=True)
@@ -135,7 +136,8 @@ def chart_histories(
             if names:
                 unit, *_ = run.columns[names[0]]
                 same = [name for name in names if run.columns[name][0] == unit]
-                charts += _chart_sizes(run, same, title, prefix, choose_unit)
+                own_title = CHARTS_OF_THE_WHOLE.get(prefix, title)
+                charts += _chart_sizes(run, same, own_title, prefix, choose_unit)
                 break
     return charts
 
@@ -178,15 +180,16 @@ def chart_columns(
         run: Solution or RunFolder.
         names: columns of one unit.
         title: stands above.
-        choose_unit: returns (factor, name of the unit) for a column and its SI unit; None: the SI
-            unit with the prefix that fits.
+        choose_unit: returns (factor, name of the unit) for a column, its SI unit and its largest
+            size; None: the SI unit with the prefix that fits.
     """
     unit, *_ = run.columns[names[0]]
     values = np.array([run.history[name] for name in names])
     if choose_unit is None:
         values, prefixed = scale_values(values, unit)
     else:
-        factor, prefixed = choose_unit(names[0], unit)
+        size = float(np.nanmax(np.abs(values), initial=0.0))
+        factor, prefixed = choose_unit(names[0], unit, size)
         values = factor * values
     lines = [Line(name, run.history["t"], row) for name, row in zip(names, values, strict=True)]
     return Chart(title, "time [s]", f"[{prefixed}]", tuple(lines))

@@ -98,6 +98,8 @@ class _Pages:
         for row in table.rows:
             rows.append([str(cell) for cell in row])
         widths = _choose_widths(rows)
+        # the head stands on the page of the first row
+        self.make_room(sum(_find_height(_wrap_cells(row, widths)) for row in rows[:2]))
         for number, row in enumerate(rows):
             self._write_row(row, widths, head=number == 0)
         self.y += 0.12
@@ -106,8 +108,8 @@ class _Pages:
         """Write a row with a line below; the columns are so many letters wide."""
         from matplotlib.lines import Line2D
 
-        cells = [wrap(cell, max(width - 1, 1)) for cell, width in zip(row, widths, strict=True)]
-        height = LINE * max(1, *map(len, cells)) + 0.03
+        cells = _wrap_cells(row, widths)
+        height = _find_height(cells)
         self.make_room(height)
         x = SIDE
         for cell, width in zip(cells, widths, strict=True):
@@ -163,6 +165,16 @@ class _Pages:
         axis.set_axis_off()
         axis.imshow(image)
         self.y += height + 0.15
+
+
+def _wrap_cells(row: Sequence[str], widths: Sequence[int]) -> list[list[str]]:
+    """Return the lines of each cell of a row; the columns are so many letters wide."""
+    return [wrap(cell, max(width - 1, 1)) for cell, width in zip(row, widths, strict=True)]
+
+
+def _find_height(cells: Sequence[Sequence[str]]) -> float:
+    """Return the height [inches] of a row of cells of so many lines."""
+    return LINE * max(1, *map(len, cells)) + 0.03
 
 
 def _choose_widths(rows: Sequence[Sequence[str]]) -> list[int]:

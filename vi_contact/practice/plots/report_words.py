@@ -40,6 +40,13 @@ CHARTS = {
     "displacement along y": ("u_y_",),
     "displacement along z": ("u_z_",),
 }
+# Titles where columns of the whole contact stand in the place of those of parts.
+CHARTS_OF_THE_WHOLE = {
+    "contact_resultant": "contact force",
+    "contact_force_": "contact force",
+    "contact_max_slip": "largest slip",
+    "contact_max_pressure": "largest contact pressure",
+}
 # Rows of the table of results: what they are called -> beginnings of columns.
 RESULTS = {
     "base shear, force of a support": ("reaction_x_", "reaction_y_", "reaction_z_"),

@@ -22,7 +22,7 @@ from . import charts
 from .charts import Chart
 from .histories import LEDGER
 from .maps import Drawing, list_maps
-from .report_numbers import ReportNumbers, read_slice
+from .report_numbers import PLACES, ReportNumbers, read_slice
 from .report_words import (
     CHARTS,
     HEADERS,
@@ -34,6 +34,7 @@ from .report_words import (
 # What of a part that stands upright says nothing: its thrust has a height in place of e.
 FOR_LEVEL_PARTS = ("e", "theta", "settlement")
 NOISE = 1e-6  # of the largest number in the same unit: what is smaller is rounding
+ROUNDING = 1e-9  # of the largest number of a column: what is smaller is none
 FEW_ROWS = 20  # of a history: accelerations of a run with no more are not filtered
 
 
@@ -110,11 +111,11 @@ def sections_of(
         raise InputError(
             f"the run in '{run.folder}' has no steps yet: report on it when it has some"
         )
-    if columns is None:
-        histories = charts.chart_histories(run, CHARTS)
-    else:
-        histories = charts.chart_groups(run, columns)
     numbers = ReportNumbers(units or ReportUnits(), read_slice(model))
+    if columns is None:
+        histories = charts.chart_histories(run, CHARTS, numbers.choose_unit)
+    else:
+        histories = charts.chart_groups(run, columns, numbers.choose_unit)
     sections = [
         _describe_model(model, inputs),
         _describe_motion(run),
@@ -210,8 +211,12 @@ def _list_results(
         # When the result is largest in size; heights count where they are numbers.
         thrust = run.history.get(f"N_{part}") if kind in ("height", "level") else None
         row = int(np.nanargmax(np.abs(values) if thrust is None else thrust + 0.0 * values))
-        factor, unit = numbers.choose_unit(name, unit)
-        of_rows = [factor * float(values[place]) for place in (row, 0, -1)]
+        size = abs(float(values[row]))
+        factor, unit = numbers.choose_unit(name, unit, size)
+        of_rows = [
+            0.0 if abs(values[place]) <= ROUNDING * size else factor * float(values[place])
+            for place in (row, 0, -1)
+        ]
         scaled = [of_rows[0], float(t[row]), *of_rows[1:]]
         yield [title, name, unit, *map(write_number, scaled)]
 
@@ -219,12 +224,14 @@ def _list_results(
 def find_scales(run: RunFolder) -> dict[str, float]:
     """Return SI unit -> the largest size of a number in the columns of this unit.
 
-    What is smaller than ``NOISE`` of it is rounding.
+    What is smaller than ``NOISE`` of it is rounding. Places do not count: they are metres where
+    displacements are micrometres.
     """
     scales: dict[str, float] = defaultdict(float)
     for name, (unit, _) in run.columns.items():
         values = run.history.get(name, np.array([]))
-        if values.ndim == 1 and not np.isnan(values).all():
+        is_measured = values.ndim == 1 and not np.isnan(values).all()
+        if is_measured and not name.startswith(PLACES):
             scales[unit] = max(scales[unit], float(np.nanmax(np.abs(values))))
     return scales
 
@@ -325,7 +332,8 @@ def _tabulate_peaks(run: RunFolder, numbers: ReportNumbers) -> Section:
     for peak in peaks(run.history, run.columns):
         if not np.nan_to_num([peak.max, peak.min]).any():
             continue
-        factor, unit = numbers.choose_unit(peak.name, peak.unit)
+        size = float(np.nanmax(np.abs([peak.max, peak.min])))
+        factor, unit = numbers.choose_unit(peak.name, peak.unit, size)
         values = (factor * peak.max, peak.t_max, factor * peak.min, peak.t_min)
         rows.append([peak.name, peak.quantity, unit, *map(write_number, values)])
     return Section(

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array
-from ..units.report_units import write_number
+from ..units.report_units import ReportUnits, write_number
 from .borders import Border, chain_border
 from .faces import add_polygons, set_limits
 from .histories import STYLE, cut, escape_dollars, require_matplotlib, scale
 from .labels import Labels
+from .report_numbers import ReportNumbers, read_slice
 
 # Colour and dashes of what holds the bodies: each is another one's nowhere in grey.
 HOLDS = (
@@ -55,18 +56,21 @@ WIDTH = 7.4
 HEIGHTS = (1.6, 6.0)
 LETTER = 0.07  # width of a letter in the picture [inches]
 INK = 0.65  # brightness of a name over that of what it names, which may be pale
-LONGEST = 48  # letters of a name in the legend, which would leave the model no room
+LONGEST = 56  # letters of a name in the legend, which would leave the model no room
 LEADER = np.array([-1.0, 0.6])  # direction in which the name of a slender body stands
 
 
-def sketch(model: Mapping[str, Any]) -> Any:
+def sketch(model: Mapping[str, Any], units: ReportUnits = ReportUnits()) -> Any:
     """Return a matplotlib Figure of a model.
 
     In the plane it has the bodies, in space boxes around them; in colours and dashes the groups
     that hold it; as marks the points of each part of the contact; and arrows for its loads. What is
     not in the file is left out.
 
-    model: the keys title, dimension, bodies, outline, supports, contact and loads of model.json.
+    Args:
+        model: the keys title, dimension, section, bodies, outline, supports, contact and loads of
+            model.json.
+        units: of the resultants of loads.
     """
     d = model["dimension"]
     outline = model["outline"]
@@ -93,7 +97,8 @@ def sketch(model: Mapping[str, Any]) -> Any:
         room = Labels(axis, WIDTH / float(np.ptp(axis.get_xlim())))
         _write_size(room, low, high, BEYOND * size)
         _write_names(room, model, holds, d)
-        _draw_loads(room, model.get("loads"), d, size)
+        numbers = ReportNumbers(units, read_slice(model))
+        _draw_loads(room, model.get("loads"), d, size, numbers)
     axis.set_title(title, fontsize=11)
     handles, labels = axis.get_legend_handles_labels()
     names = [cut(label, LONGEST) for label in labels]
@@ -125,7 +130,8 @@ def _draw_bodies(axis: Any, outline: Any, bodies: Sequence[Mapping[str, Any]]) -
         fill = FILLS[number % len(FILLS)]
         axis.add_patch(PathPatch(border.path, facecolor=fill, edgecolor="none", zorder=0.5))
         if number < len(bodies):
-            label = escape_dollars(_describe_body(bodies[number]))
+            sizes = np.ptp(np.concatenate(border.chains), axis=0)
+            label = escape_dollars(_describe_body(bodies[number], sizes))
             nowhere = np.full((1, 2), np.nan)
             axis.add_patch(Polygon(nowhere, facecolor=fill, edgecolor="0.3", label=label))
 
@@ -137,11 +143,11 @@ def _list_borders(outline: Any) -> Iterator[tuple[int, Border]]:
             yield int(part["region"]), chain_border(np.array(part["lines"], dtype=float))
 
 
-def _describe_body(body: Mapping[str, Any]) -> str:
-    """Return the name of a body, its stiffness and its density."""
+def _describe_body(body: Mapping[str, Any], sizes: Array) -> str:
+    """Return the name of a body, its width and height (2,) [m], stiffness and density."""
     material = body.get("material")
     numbers = material if isinstance(material, Mapping) else {}
-    words = []
+    words = [" × ".join(write_number(float(size)) for size in sizes) + " m"]
     E = numbers.get("E")
     if isinstance(E, int | float) and E > 0.0:
         factor, unit = scale(float(E), "Pa")
@@ -150,7 +156,7 @@ def _describe_body(body: Mapping[str, Any]) -> str:
     if isinstance(rho, int | float):
         words.append(f"{write_number(float(rho))} kg/m³")
     name = str(body.get("name", "body"))
-    return f"{name}: {', '.join(words)}" if words else name
+    return f"{name}: {', '.join(words)}"
 
 
 def _name_supports(
@@ -209,10 +215,17 @@ def _draw_contact(axis: Any, part: Mapping[str, Any], d: int, colour: str, marke
             )
 
 
-def _draw_loads(labels: Labels, loads: Any, d: int, size: float) -> None:
+def _draw_loads(labels: Labels, loads: Any, d: int, size: float, numbers: ReportNumbers) -> None:
     """Draw each load that has a resultant and a point as an arrow to this point, with its name.
 
     Weights are drawn from the middle of their body, without names.
+
+    Args:
+        labels: of the picture.
+        loads: of model.json.
+        d: dimension of the model.
+        size: largest one of the model [m].
+        numbers: writes the resultants, which stand beside the names.
     """
     if d != 2:
         return
@@ -229,7 +242,7 @@ def _draw_loads(labels: Labels, loads: Any, d: int, size: float) -> None:
         labels.axis.annotate("", tip, tail, arrowprops=look, zorder=6)
         labels.reserve(np.array([tip, tail]))
         if not weight:
-            names.append((name, tail, -along))
+            names.append((f"{name}: {numbers.write(length, '', 'N')}", tail, -along))
     for name, tail, away in names:
         labels.write(escape_dollars(name), tail, away, style="italic")
 

@@ -24,15 +24,17 @@ class Change:
     Attributes:
         share: (number of the refined run - number) / |number|; nan where it has none.
         text: of a cell.
+        is_brief: whether the peak lasts one step in both runs, and so is as short as the step is.
     """
 
     share: float
     text: str
+    is_brief: bool = False
 
     @property
     def is_converged(self) -> bool:
         """Say whether the change is within ``LIMIT``; False where it is unknown."""
-        return bool(abs(self.share) <= LIMIT)
+        return bool(abs(self.share) <= LIMIT) and not self.is_brief
 
 
 def compare(
@@ -82,6 +84,8 @@ def _find_change(number: DecidingNumber, refined: RunFolder, scale: float) -> Ch
     if number.value == 0.0:
         return Change(np.inf, "no: it was zero")
     share = difference / abs(number.value)
-    verdict = "yes" if abs(share) <= LIMIT else "no"
+    is_brief = number.is_brief and other.is_brief
+    verdict = "yes" if abs(share) <= LIMIT and not is_brief else "no"
     sign = "+" if share > 0.0 else ""
-    return Change(share, f"{verdict}: {sign}{write_number(100.0 * share, 2)} %")
+    still = ", still one step" if is_brief else ""
+    return Change(share, f"{verdict}: {sign}{write_number(100.0 * share, 2)} %{still}", is_brief)

@@ -11,6 +11,13 @@ from ...run.files.reading import RunFolder
 from ..engineering.peak_values import column_of
 from .rules import WORDS, History, Measure, Rule, find_columns, list_rules
 
+FORCES = {"N": "normal force", "T": "shear", "M": "moment about the centre"}  # of parts
+WHOLE = {
+    "contact_resultant": "contact force",
+    "contact_uplift": "open share of the contact",
+    "contact_max_pressure": "largest contact pressure",
+    "contact_max_slip": "largest slip",
+}
 NEARLY = 0.9  # of a peak: while a value is above, the peak lasts
 
 
@@ -114,7 +121,26 @@ def _take_column(name: str, run: RunFolder) -> DecidingNumber:
             Measure.SAFETY,
             history,
         )
-    return measure_column(_shorten_meaning(meaning), name, Measure.PEAK, history)
+    return measure_column(_name_column(name, meaning, run.history), name, Measure.PEAK, history)
+
+
+def _name_column(name: str, meaning: str, history: History) -> str:
+    """Return what a column is called on the page, in words of the trade where it is a force."""
+    if name in WHOLE:
+        return WHOLE[name]
+    kind, _, part = name.partition("_")
+    if kind == "reaction":
+        axis, _, support = part.partition("_")
+        return (
+            f"moment of support {support}"
+            if axis[0] == "M"
+            else (f"force of support {support} along {axis}")
+        )
+    if kind not in FORCES or f"uplift_{part}" not in history:
+        return _shorten_meaning(meaning)
+    is_upright = np.isfinite(history.get(f"level_{part}", np.nan)).any()
+    word = "thrust" if kind == "N" and is_upright else FORCES[kind]
+    return f"{word}, part {part}"
 
 
 def _shorten_meaning(meaning: str) -> str:

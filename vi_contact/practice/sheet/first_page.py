@@ -15,6 +15,7 @@ from ..units.report_units import Written, write_number
 from .choices import Sheet
 from .convergence import LIMIT, NOT_TESTED, TESTS, Change, compare
 from .deciding import NEARLY, DecidingNumber, Measure, choose_numbers
+from .rigid_base import explain_edge_pressures
 
 LONGEST = 300  # letters of a text of the title block
 UNKNOWN = "-"
@@ -68,6 +69,7 @@ def describe_first_page(
     failed: Mapping[str, str],
     cost: str = "",
     sketches: Sequence[Path] = (),
+    model: Mapping[str, Any] | None = None,
 ) -> Section:
     """Return the section with the numbers that decide, and the sketch of the model below it.
 
@@ -79,6 +81,7 @@ def describe_first_page(
         failed: "h" or "dt" -> why there is none.
         cost: what half the time step would cost, in words; "" where it is unknown.
         sketches: pictures of the model.
+        model: model.json; None where there is none.
 
     Raises:
         InputError: a number of the sheet that the run does not have.
@@ -101,6 +104,7 @@ def describe_first_page(
         *_explain_slice(numbers),
         *_explain_convergence(deciding, changes, refined, cost),
         *_explain_brief_peaks(deciding, changes),
+        *explain_edge_pressures(deciding, run.history, model or {}, numbers),
     ]
     return Section("Numbers that decide", tables=[table], notes=notes, pictures=sketches)
 
@@ -174,7 +178,8 @@ def _explain_convergence(
         )
     if refined:
         sentences.append(
-            f"Converged means: half the step changes the number by at most {100 * LIMIT:.0f} %. "
+            f"Converged means: half the step changes the number by at most {100 * LIMIT:.0f} %, "
+            "and it is no peak that lasts one step in both runs. "
             "If the error falls with the first power of the step, the error of a number here is "
             "twice its change."
         )

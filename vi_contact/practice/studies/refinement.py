@@ -18,7 +18,7 @@ from ...run.files.folder import CHECKPOINT, HISTORY_CSV, MODEL
 from ...run.files.reading import RunFolder, read_object, read_run
 from ..engineering.peak_values import GROWS, peaks
 from ..plots.report_numbers import ReportNumbers
-from ..plots.sections import NOISE, SAY, Section, Table
+from ..plots.sections import NOISE, SAY, Section, Table, find_scales
 from ..units.report_units import write_number
 from .cases.library import COPY, read_copy, read_settings
 from .cases.toml_file import format_value, with_settings
@@ -296,11 +296,12 @@ def describe_refinement(
     for name in refined:
         header += [NAMES[name], "difference"]
     sized = [peak for peak in peaks(run.history, run.columns) if peak.name not in UNSIZED]
-    rows = []
-    for peak in sized:
-        largest = max(_measure(other) for other in sized if other.unit == peak.unit)
-        if _measure(peak) > NOISE * largest:
-            rows.append(_compare(peak, refined, numbers))
+    scales = find_scales(run)
+    rows = [
+        _compare(peak, refined, numbers)
+        for peak in sized
+        if _measure(peak) > NOISE * scales[peak.unit]
+    ]
     table = Table(header, rows, sortable=True)
     finer = " and with ".join(IN_WORDS[name] for name in refined)
     return Section(
@@ -320,7 +321,7 @@ def _compare(
     """
     size = _measure(peak)
     mark = ", raw: not convergent at impacts" if peak.quantity.endswith(GROWS) else ""
-    factor, unit = numbers.choose_unit(peak.name, peak.unit)
+    factor, unit = numbers.choose_unit(peak.name, peak.unit, size)
     row = [peak.name + mark, unit, write_number(factor * size)]
     for others in refined.values():
         other = _measure(others[peak.name]) if peak.name in others else np.nan

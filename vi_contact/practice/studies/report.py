@@ -116,6 +116,7 @@ def write_report(
         failed=failed,
         cost=_estimate_cost(run),
         sketches=sketches,
+        model=model,
     )
     told = sections_of(run, model, columns, inputs=inputs, units=sheet.units)
     told[0] = replace(told[0], begins_page=True)
@@ -192,7 +193,7 @@ def _read_model(
     try:
         model = read_object(folder / MODEL)
         inputs = input_tables(model, units)
-        image = render_image(sketch(model), bbox_inches="tight")
+        image = render_image(sketch(model, units), bbox_inches="tight")
     except InputError:
         raise
     except OSError as error:
@@ -267,7 +268,7 @@ def _describe_comparison(comparison: Comparison, numbers: ReportNumbers) -> list
         for name, (value, unit) in comparison.inputs.items()
     ]
     applies = comparison.applies
-    factor, unit = numbers.choose_unit("", comparison.unit)
+    factor, unit = numbers.choose_unit("", comparison.unit, abs(comparison.found))
     return [
         comparison.name,
         comparison.formula,

@@ -83,6 +83,18 @@ _QUANTITIES = {
     "rad": "angle",
     "m/s²": "acceleration",
 }
+# What is less than one (moduli, masses), or than a thousandth (others), of the usual unit is
+# written in the first of these in which it is no less than one, or in the last of them.
+_SMALLER = {
+    "GPa": ("MPa", "kPa", "Pa"),
+    "t": ("kg",),
+    "kN": ("N",),
+    "kPa": ("Pa",),
+    "mm": ("µm",),
+    "rad": ("µrad",),
+}
+_LEAST = {"modulus": 1.0, "mass": 1.0}
+_LEAST_OF_OTHERS = 1e-3
 # Quantities that are those of a metre of the body in plane strain.
 _PER_METRE = ("force", "moment", "mass")
 
@@ -116,34 +128,62 @@ def write_quantity(
         slice_thickness: in plane strain that of the slice [m], by which forces, moments and masses
             are divided; None where the body has a thickness of its own or is in space.
     """
-    factor, name = choose_unit(unit, units, quantity=quantity, slice_thickness=slice_thickness)
+    factor, name = choose_unit(
+        unit, units, quantity=quantity, slice_thickness=slice_thickness, size=abs(value)
+    )
     return Written(write_number(factor * value), name)
 
 
 def choose_unit(
-    unit: str, units: ReportUnits, *, quantity: str = "", slice_thickness: float | None = None
+    unit: str,
+    units: ReportUnits,
+    *,
+    quantity: str = "",
+    slice_thickness: float | None = None,
+    size: float = np.inf,
 ) -> tuple[float, str]:
     """Return (factor from the SI unit, name of the unit) of the report.
 
-    A unit that no field of ``units`` stands for is kept.
+    A unit that no field of ``units`` stands for is kept. For small numbers a smaller unit takes the
+    place of the usual one, and of no other.
 
     Args:
         unit: the SI unit.
         units: those of the report.
         quantity: as of ``write_quantity``.
         slice_thickness: as of ``write_quantity``.
+        size: of the largest number that is written in it [``unit``].
     """
     quantity = quantity or _QUANTITIES.get(unit, "")
     if not quantity:
         return 1.0, unit
+    # in plane strain a force is that of so many metres
+    depth = slice_thickness if slice_thickness and quantity in _PER_METRE else None
     field = "force" if quantity == "moment" else quantity
-    name = getattr(units, field)
+    name = _fit_unit(field, getattr(units, field), size / (depth or 1.0))
     factor = read_unit(_SI[field])[0] / read_unit(name)[0]
     if quantity == "moment":
         name = f"{name} m"
-    if slice_thickness is not None and quantity in _PER_METRE:
-        return factor / slice_thickness, f"{name}/m"
-    return factor, name
+    return (factor, name) if depth is None else (factor / depth, f"{name}/m")
+
+
+def _fit_unit(field: str, name: str, size: float) -> str:
+    """Return a unit, or a smaller one where it is the usual one and the number is small.
+
+    Args:
+        field: of ``ReportUnits``.
+        name: of the unit.
+        size: of the number, in the SI unit.
+    """
+    least = _LEAST.get(field, _LEAST_OF_OTHERS)
+    is_usual = name == getattr(ReportUnits, field)
+    if not is_usual or not 0.0 < size < least * read_unit(name)[0]:
+        return name
+    for smaller in _SMALLER.get(name, ()):
+        name = smaller
+        if size >= read_unit(name)[0]:
+            break
+    return name
 
 
 def write_number(value: float, digits: int = DIGITS) -> str:

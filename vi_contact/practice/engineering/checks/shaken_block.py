@@ -95,8 +95,8 @@ class NewmarkBlock(Check):
             push = abs(float(history[f"T_{part}"][0]))
             name = "mu (the yield coefficient)"
             source = (
-                f"(mu N - |T|)/W of the first row, mu = {mu:.4g}, N = {normal:.5g} N, "
-                f"T = {push:.5g} N, W = {weight:.5g} N"
+                f"(mu N - |T|)/W of the first row, mu = {mu:.4g}, N = {1e-3 * normal:.5g} kN, "
+                f"T = {1e-3 * push:.5g} kN, W = {1e-3 * weight:.5g} kN"
             )
             mu = (mu * normal - push) / weight
         if self.mu is not None:

@@ -1,5 +1,6 @@
 """Describe what holds the bodies of a model, and where they may touch."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
@@ -15,6 +16,8 @@ from ..bodies import Body
 from ..friction_of_tables import find_mu
 from ..table_calls import Group, walk_nodes
 
+_CAPITAL = re.compile(r"(?<=[a-z])(?=[A-Z])")  # between the words of a name such as CompliantBase
+
 
 def describe_supports(space: Any) -> Iterator[dict[str, Any]]:
     """Yield what holds the bodies, moves them, absorbs or lets in waves.
@@ -27,7 +30,8 @@ def describe_supports(space: Any) -> Iterator[dict[str, Any]]:
             kind = "moved"
         yield _describe_support(space, kind, [support.name], support.components)
     for boundary in space.forms.boundaries:
-        yield _describe_support(space, type(boundary).__name__, [boundary.facets.name], None)
+        kind = _CAPITAL.sub(" ", type(boundary).__name__).lower()
+        yield _describe_support(space, kind, [boundary.facets.name], None)
     for tie in space.ties:
         yield _describe_support(space, "tied", [tie.first.name, tie.second.name], tie.components)
 

@@ -10,6 +10,7 @@ from ....units.report_units import ReportUnits, choose_unit, write_number, write
 Model = Mapping[str, Any]
 Row = tuple[str, str, str, str]
 NONE = "-"  # where there is no unit
+ROUNDING = 1e-9  # of the largest component of a vector: what is less is none
 
 
 @dataclass(frozen=True)
@@ -45,10 +46,11 @@ class Pen:
         self, name: str, values: Sequence[float], unit: str, remark: str = "", *, quantity: str = ""
     ) -> Row:
         """Return the row of the components of a vector, as (1, 2); arguments as of ``row``."""
-        factor, name_of_unit = choose_unit(
-            unit, self.units, quantity=quantity, slice_thickness=self.slice_thickness
-        )
-        numbers = [write_number(factor * value) for value in values]
+        size = max((abs(value) for value in values), default=0.0)
+        factor, name_of_unit = self._choose_unit(unit, quantity, size)
+        # what is rounding beside the largest component is zero
+        kept = [0.0 if abs(value) <= ROUNDING * size else value for value in values]
+        numbers = [write_number(factor * value) for value in kept]
         text = numbers[0] if len(numbers) == 1 else f"({', '.join(numbers)})"
         return (clip(name), text, name_of_unit, clip(remark))
 
@@ -56,8 +58,20 @@ class Pen:
         self, name: str, ends: Sequence[float], unit: str, remark: str = "", *, quantity: str = ""
     ) -> Row:
         """Return the row of what goes from one number to another; arguments as of ``row``."""
-        low, high = (self.row(name, end, unit, remark, quantity=quantity) for end in ends)
-        return low if low[1] == high[1] else (low[0], f"{low[1]} to {high[1]}", low[2], low[3])
+        factor, name_of_unit = self._choose_unit(unit, quantity, max(abs(end) for end in ends))
+        low, high = (write_number(factor * end) for end in ends)
+        text = low if low == high else f"{low} to {high}"
+        return (clip(name), text, name_of_unit, clip(remark))
+
+    def _choose_unit(self, unit: str, quantity: str, size: float) -> tuple[float, str]:
+        """Return factor and name of the unit for numbers up to a size in an SI unit."""
+        return choose_unit(
+            unit,
+            self.units,
+            quantity=quantity,
+            slice_thickness=self.slice_thickness,
+            size=size,
+        )
 
 
 def clip(value: Any) -> str:

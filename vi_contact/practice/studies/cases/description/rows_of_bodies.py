@@ -135,7 +135,7 @@ def _list_material(
     density = body.get("density") or [material.get("rho")] * 2
     if density[0] is not None:
         yield pen.row_of_range(f"{name}: density", density, "kg/m³")
-        factor, force = choose_unit("N", pen.units)
+        factor, force = choose_unit("N", pen.units, size=STANDARD_GRAVITY * max(density))
         low, high = (write_number(STANDARD_GRAVITY * factor * value) for value in density)
         weight = low if low == high else f"{low} to {high}"
         yield (f"{name}: unit weight", weight, f"{force}/m³", "")

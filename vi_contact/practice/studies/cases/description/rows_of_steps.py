@@ -1,11 +1,19 @@
 """Write the rows of damping, periods, time steps and waves, and of the sides of a model."""
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from typing import Any
 
 from ....units.report_units import write_number
 from .pen import Model, Pen, Row, list_objects, say
+
+_LONG_NUMBER = re.compile(r"\d+\.\d{5,}(?:e-?\d+)?")  # as a program writes one
+
+
+def _shorten_numbers(text: str) -> str:
+    """Return a text of a program with the digits of a report."""
+    return _LONG_NUMBER.sub(lambda found: write_number(float(found[0])), text)
 
 
 def list_damping(model: Model, pen: Pen) -> Iterator[Row]:
@@ -13,7 +21,7 @@ def list_damping(model: Model, pen: Pen) -> Iterator[Row]:
     if "damping" in model:
         # the ratios of the modes stand beside the periods below
         sources = [text for text in str(model["damping"]).split("; ") if " at T1 = " not in text]
-        yield say("law", "; ".join(sources))
+        yield say("law", _shorten_numbers("; ".join(sources)))
     periods = model.get("periods") or []
     ratios = model.get("damping_ratios") or []
     for number, period in enumerate(periods, start=1):
@@ -71,7 +79,8 @@ def list_steps(model: Model, pen: Pen) -> Iterator[Row]:
     for name, text in method.items():
         kinds = [solver.partition("(")[0] for solver in str(text).split(", then ")]
         is_plain = name == "solver" or str(text).endswith("()")
-        yield say(name, ", then ".join(kinds), "" if is_plain else text)
+        remark = "" if is_plain else _shorten_numbers(str(text))
+        yield say(name, ", then ".join(kinds), remark)
     for wave in list_objects(model, "waves"):
         if "c_s" not in wave:
             continue

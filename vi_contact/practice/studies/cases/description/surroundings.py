@@ -1,17 +1,21 @@
 """Say how far the sides of a model are from the structure in it.
 
 The structure are the bodies that no side of the model belongs to: the boxes round them reach
-neither the lowest level of the box of the model nor its sides. The distances are told in widths of
+neither the lowest level of the box of the model nor its sides. The others are a ground if they fill
+enough of the boxes round them: columns of a frame do not. The distances are told in widths of
 the structure, and in lengths of shear waves of the slowest body around it, at the mean period of
 the record with the longest one.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .....core.step import AXES
 
 REACHED = 1e-6  # of the extent of the box: a body that is so near to a side reaches it
+
+FILLED = 0.25  # of the boxes round the bodies of a ground, at least (CHOSEN)
 
 
 def find_bottom(model: Mapping[str, Any]) -> tuple[int, str]:
@@ -47,8 +51,9 @@ def describe_sides(model: Mapping[str, Any]) -> dict[str, Any]:
     top = "max" if bottom == "min" else "min"
     sides = [side for side in ends if side != (vertical, top)]  # above is no ground
     inside = [body for body in model["bodies"] if not _reaches_side(body["box"], box, sides)]
-    around = [body["name"] for body in model["bodies"] if body not in inside]
-    if not inside or not around:
+    others = [body for body in model["bodies"] if body not in inside]
+    around = [body["name"] for body in others]
+    if not inside or not _is_ground(others):
         return {}
 
     # The box of the structure, and the slowest waves around it.
@@ -81,6 +86,15 @@ def describe_sides(model: Mapping[str, Any]) -> dict[str, Any]:
         "wave_length": length,
         "distances": distances,
     }
+
+
+def _is_ground(bodies: Sequence[Mapping[str, Any]]) -> bool:
+    """Say whether bodies fill enough of the boxes round them to be a ground; without any not."""
+    whole = 0.0
+    for body in bodies:
+        ends = zip(body["box"]["min"], body["box"]["max"], strict=True)
+        whole += math.prod(high - low for low, high in ends)
+    return sum(body["size"] for body in bodies) > FILLED * whole
 
 
 def _reaches_side(
