@@ -18,6 +18,9 @@ import vi_contact as vc
 SPRING = 400.0  # N/m, of each spring
 CUBIC = 4e4  # N/m³: at strains of the run tangents are up to eight times the reference
 MASS = 0.05  # kg, of each node
+DEGREE = (
+    3  # of integrals; UFL estimates more than twice that for a logarithm, at four times the cost
+)
 GAP = 0.01  # m, between the end of the chain and the stop
 
 
@@ -172,7 +175,12 @@ def throw_block(
     rubber = rubber or Rubber()
     speed = 0.25 * rubber.shear_speed
     on, tags = fem.build_mesh(BlockMesh(lengths=(1.0, 2.0), divisions=(n, 2 * n)), comm)
-    system = fem.assemble(on, forms=rubber.make_forms(), initial_velocity=(0.4 * speed, -speed))
+    system = fem.assemble(
+        on,
+        forms=rubber.make_forms(),
+        initial_velocity=(0.4 * speed, -speed),
+        quadrature_degree=DEGREE,
+    )
     ground = vc.HalfSpace(point=(0.0, -0.02), normal=(0.0, 1.0))
     surface = fem.contact_surface(system, tags["bottom"], obstacle=ground)
     return vc.ContactProblem(system, surface, **more)
@@ -202,7 +210,9 @@ def hang_block(
     width, height = lengths
     on = dolfinx.mesh.create_rectangle(comm, [[0.0, 0.0], [width, height]], divisions)
     top = fem.Facets.where("top", on, lambda x: np.isclose(x[1], height))
-    system = fem.assemble(on, forms=(rubber or Rubber()).make_forms(), clamped=top)
+    system = fem.assemble(
+        on, forms=(rubber or Rubber()).make_forms(), clamped=top, quadrature_degree=DEGREE
+    )
 
     def may_touch(x: np.ndarray) -> np.ndarray:
         """Mark points of the bottom, and of the sides."""
