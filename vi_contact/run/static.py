@@ -121,7 +121,7 @@ class Equilibria:
     the stage is a sequence of such steps (``proximal``).
 
     Attributes:
-        curved: what solves the stages of a body that is not linear, None for a linear one.
+        curved: what solves the stages of a body that is not linear, once there was one.
     """
 
     def __init__(
@@ -143,8 +143,14 @@ class Equilibria:
         self._solve: Callable[[StepProblem], tuple[StepResult, Certificate]]
         self.curved: NonlinearSolver | None = None
         refuse_matrix(problem, self._K)
+        self._solver = solver
+        self._tolerance = tolerance
         if system.internal is not None:
-            self.curved = self._prepare_nonlinear(solver, tolerance)
+            if system.floating:
+                raise InputError(
+                    "a static stage of a body that is not linear needs supports that hold it: "
+                    "clamp a part of it, or march from rest with damping"
+                )
         elif system.floating:
             proximal = Proximal(problem, self._K, solver, tolerance)
 
@@ -161,28 +167,6 @@ class Equilibria:
                 return answer.result, answer.certificate
 
             self._solve = solve_once
-
-    def _prepare_nonlinear(self, solver: Solver, tolerance: float) -> NonlinearSolver:
-        """Return what solves stages of a body whose internal force is not linear.
-
-        Args:
-            solver: of linear steps.
-            tolerance: of the certificates, relative.
-
-        Raises:
-            InputError: contact alone holds a body.
-        """
-        problem = self._problem
-        system = problem.static_load
-        if system.floating:
-            raise InputError(
-                "a static stage of a body that is not linear needs supports that hold it: clamp a "
-                "part of it, or march from rest with damping"
-            )
-        first = self._pose_stage(initial_state(problem), 0.0)
-        return NonlinearSolver(
-            problem, first, [solver], tolerance, system=system, advice=ADVICE_NONLINEAR
-        )
 
     def _pose_stage(self, old: State, t: float) -> Stage:
         """Return the balance of forces at rest at a time, in d = u - u of the state before.
@@ -218,8 +202,8 @@ class Equilibria:
         # loads, motions and laws of the user's may fail on one rank
         with together(problem.surface.comm):
             problem.surface.refuse_driven(t)
-            if self.curved is not None:
-                return self._solve_nonlinear(self.curved, old, t)
+            if problem.static_load.internal is not None:
+                return self._solve_nonlinear(old, t)
             step = StepProblem(
                 A=self._K,
                 b=problem.static_load.load.at_rest(t),
@@ -247,16 +231,24 @@ class Equilibria:
             certificate=certificate.worst,
         )
 
-    def _solve_nonlinear(self, solver: NonlinearSolver, old: State, t: float) -> State:
+    def _solve_nonlinear(self, old: State, t: float) -> State:
         """Return the equilibrium of a body that is not linear at a time.
 
         Args:
-            solver: of its stages.
             old: the state before.
             t: the time [s].
         """
         stage = self._pose_stage(old, t)
-        step, certified = solver.solve(stage)
+        if self.curved is None:
+            self.curved = NonlinearSolver(
+                self._problem,
+                stage,
+                [self._solver],
+                self._tolerance,
+                system=self._problem.static_load,
+                advice=ADVICE_NONLINEAR,
+            )
+        step, certified = self.curved.solve(stage)
         answer = complete(stage, step, certified.result)
         rest = np.zeros_like(old.u)
         return State(
