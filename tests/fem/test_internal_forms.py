@@ -188,6 +188,34 @@ def test_released_supports_leave_their_reactions(comm: Any) -> None:
     assert off <= 1e-9 * size
 
 
+@pytest.mark.two_ranks
+@pytest.mark.promise("guide/nonlinear.md", "keeps 99 % of its energy over five turns", bound="0.99")
+def test_a_block_spins(comm: Any) -> None:
+    """Once a second, by HHT in 60 steps a turn, far above the ground."""
+    stiff = Rubber(E=1e7)
+    rate = 2.0 * np.pi
+    mesh, tags = fem.build_mesh(BlockMesh(lengths=(0.5, 1.0), divisions=(4, 8)), comm)
+    system = fem.assemble(
+        mesh,
+        forms=stiff.make_forms(),
+        quadrature_degree=3,
+        initial_velocity=lambda x: rate * np.column_stack([0.5 - x[:, 1], x[:, 0] - 0.25]),
+    )
+    below = vc.HalfSpace(point=(0.0, -50.0), normal=(0.0, 1.0))
+    surface = fem.contact_surface(system, tags["bottom"], obstacle=below)
+    stepper = vc.Stepper(vc.ContactProblem(system, surface), scheme=vc.HHT(-0.05))
+    ledger = vc.Energy()
+    row = ledger.start(stepper.method.problem, stepper.state)
+    start = row["energy_kinetic"]
+    for _ in range(300):
+        trial = stepper.attempt(1.0 / 60.0)
+        row = ledger.row(trial.report)
+        stepper.accept(trial)
+    kept = (row["energy_kinetic"] + row["energy_strain"]) / start
+    assert 0.99 <= kept <= 1.0
+    assert abs(row["energy_defect"]) <= 1e-9 * start
+
+
 @pytest.mark.serial
 def test_what_takes_linear_forces_is_refused() -> None:
     """In a sentence that says what to do instead."""

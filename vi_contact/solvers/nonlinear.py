@@ -423,32 +423,54 @@ class NonlinearSolver:
         if last <= FLAT * abs(first):
             return end
 
-        # Between a part with a negative slope and one with a positive one, or with none, lies the
-        # place to go to: by the secant, or the middle where a slope is no number.
+        return self._find_flat(walk, there, first, last)
+
+    def _find_flat(self, walk: Walk, there: Pass, first: float, last: float) -> Place:
+        """Return a place on the way of a pass where the slope is small. Collective.
+
+        It lies between a part of the way with a negative slope and one with a positive slope or
+        none: by the secant and by halves in turn. Where none is found so, it is the last place with
+        a negative slope.
+
+        Args:
+            walk: which is at the start of the pass.
+            there: its end.
+            first: slope at the start, negative where the start is outside of the obstacle.
+            last: slope at the end.
+
+        Raises:
+            StepFailure: there is no such place.
+        """
+        start = walk.here
+        way = there.place.d - start.d
         low = 0.0
         low_slope = first
         high = 1.0
         high_slope = last
-        for _ in range(PARTS):
+        lowest: Place | None = None
+        for turn in range(PARTS):
             share = 0.5
-            if isfinite(high_slope):
+            if turn % 2 == 0 and isfinite(high_slope):
                 share = low_slope / (low_slope - high_slope)
                 share = min(max(share, INSIDE), 1.0 - INSIDE)
             part = low + share * (high - low)
             d = start.d + part * way
-            rest = find_rest(self._system, walk.stage, d)
-            slope = self._find_slope(there, rest, way)
+            place = Place(d, find_rest(self._system, walk.stage, d), there.place.active)
+            slope = self._find_slope(there, place.rest, way)
             if abs(slope) <= FLAT * abs(first) or (not walk.outside and isfinite(slope)):
-                return Place(d, rest, end.active)
+                return place
             if slope < 0.0:
                 low = part
                 low_slope = slope
+                lowest = place
             else:
                 high = part
                 high_slope = slope
-        raise StepFailure(
-            f"{_name(walk)}: no part of a linear step leads to less energy: {self._advice}"
-        )
+        if lowest is None:
+            raise StepFailure(
+                f"{_name(walk)}: no part of a linear step leads to less energy: {self._advice}"
+            )
+        return lowest
 
     def _find_slope(self, there: Pass, rest: Array, way: Array) -> float:
         """Return the slope of the potential along a way, -(rest - B_tᵀ scale r_t)·way. Collective.
