@@ -66,6 +66,7 @@ class BoundaryLayer(Midpoint):
         """Raise InputError for what the law does not cover."""
         super().check(problem)
         surface = problem.surface
+        problem.system.refuse_nonlinear("BoundaryLayer", "use an impact law, such as Newton(e)")
         if problem.frictional:
             raise InputError(
                 f"BoundaryLayer is a law without friction: leave {problem.friction} out"

@@ -189,7 +189,8 @@ def cross_check(
 ) -> CrossChecked:
     """March with the first solver and compare the others with it at every step.
 
-    ``report()`` of the result tells how far they are off; its statistics are of all accepted steps.
+    ``report()`` of the result tells how far they are off; its statistics are of all accepted steps,
+    and of every linear step in them where the body is not linear.
 
     Args:
         problem: as of ``march``.

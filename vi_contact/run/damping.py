@@ -62,8 +62,8 @@ class _CachedModes:
 def first_modes(problem: ContactProblem) -> FirstModes:
     """Return the first three undamped natural modes of a problem, with the ratios that its C gives.
 
-    They are computed once for a system, a surface, and contact with or without friction.
-    Collective.
+    They are computed once for a system, a surface, and contact with or without friction. A body
+    that is not linear has those of its reference stiffness. Collective.
     """
     check_problem_given("first_modes", problem)
     problem.system.refuse_statics_only("first_modes")

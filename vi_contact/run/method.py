@@ -128,9 +128,10 @@ def with_defaults(
 ) -> tuple[ContactProblem, Scheme]:
     """Return (the problem with a mass matrix, the scheme to run it with).
 
-    Without a scheme: the trapezoidal rule on redistributed mass; with an impact law, or with mass
-    at the contact nodes asked for, the Zienkiewicz-Wood-Taylor step at phi = ½, which never gains
-    energy. Without a mass: the scheme's.
+    Without a scheme: the trapezoidal rule on redistributed mass; with an impact law, with mass at
+    the contact nodes asked for, or of a body that is not linear, the Zienkiewicz-Wood-Taylor step
+    at phi = ½, which never gains energy of a linear body. Without a mass: the scheme's, and the
+    consistent one of a body that is not linear.
 
     Args:
         problem: what is marched.
@@ -140,8 +141,9 @@ def with_defaults(
     check_problem_given("march", problem)
     for other in several("march", "others", others, "give a list of problems, or leave it out"):
         check_problem_given("march", other)
+    curved = problem.system.internal is not None
     if scheme is None:
-        massive = problem.mass is not None and isinstance(problem.mass, ConsistentMass)
+        massive = curved or isinstance(problem.mass, ConsistentMass)
         if problem.impact is None and not massive:
             scheme = Trapezoidal()
         else:
@@ -150,7 +152,7 @@ def with_defaults(
         "march", "scheme", scheme, SCHEME, "give a time scheme, such as Trapezoidal(), or None"
     )
     if problem.mass is None:
-        problem = replace(problem, mass=scheme.mass)
+        problem = replace(problem, mass=ConsistentMass() if curved else scheme.mass)
     for other in others:
         shared = problem.beside(other)
         if shared is not None:

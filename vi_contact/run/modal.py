@@ -27,6 +27,8 @@ def lowest_frequency(
 ) -> float:
     """Return f1 [Hz] of K phi = (2 pi f)² M phi without contact.
 
+    K is the reference stiffness of a body that is not linear.
+
     By inverse iteration with one factorisation of K. The start vector is the static answer to a
     uniform acceleration in all directions: deterministic, and not orthogonal to the first mode of
     structures that a base motion can excite.

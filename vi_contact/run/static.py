@@ -40,6 +40,9 @@ log = logging.getLogger(__name__)
 OPEN = 0.05  # of the area that touches at the start: so much may be open at rest without a warning
 TOUCHING = 1e-9  # of the largest coordinate: a gap that is none
 ADVICE = "try another solver, or smaller load steps, and check the data"
+ADVICE_NONLINEAR = (
+    "try smaller load steps, or march with damping where the body may buckle, and check the data"
+)
 
 
 def static_equilibrium(
@@ -116,6 +119,9 @@ class Equilibria:
     Where prescribed displacements hold every body, K is positive definite, and a stage is one step
     of the contract (``core.step``) with A = K. Where contact alone holds one, K is singular, and
     the stage is a sequence of such steps (``proximal``).
+
+    Attributes:
+        curved: what solves the stages of a body that is not linear, once there was one.
     """
 
     def __init__(
@@ -135,10 +141,16 @@ class Equilibria:
             system.K, system.algebra, space=system.space, inertia=(0.0, system.M)
         )
         self._solve: Callable[[StepProblem], tuple[StepResult, Certificate]]
-        self._curved: NonlinearSolver | None = None
+        self.curved: NonlinearSolver | None = None
         refuse_matrix(problem, self._K)
+        self._solver = solver
+        self._tolerance = tolerance
         if system.internal is not None:
-            self._curved = self._prepare_nonlinear(solver, tolerance)
+            if system.floating:
+                raise InputError(
+                    "a static stage of a body that is not linear needs supports that hold it: "
+                    "clamp a part of it, or march from rest with damping"
+                )
         elif system.floating:
             proximal = Proximal(problem, self._K, solver, tolerance)
 
@@ -155,26 +167,6 @@ class Equilibria:
                 return answer.result, answer.certificate
 
             self._solve = solve_once
-
-    def _prepare_nonlinear(self, solver: Solver, tolerance: float) -> NonlinearSolver:
-        """Return what solves stages of a body whose internal force is not linear.
-
-        Args:
-            solver: of linear steps.
-            tolerance: of the certificates, relative.
-
-        Raises:
-            InputError: contact alone holds a body.
-        """
-        problem = self._problem
-        system = problem.static_load
-        if system.floating:
-            raise InputError(
-                "a static stage of a body that is not linear needs supports that hold it: clamp a "
-                "part of it, or march from rest with damping"
-            )
-        first = self._pose_stage(initial_state(problem), 0.0)
-        return NonlinearSolver(problem, first, [solver], tolerance, system=system, advice=ADVICE)
 
     def _pose_stage(self, old: State, t: float) -> Stage:
         """Return the balance of forces at rest at a time, in d = u - u of the state before.
@@ -210,8 +202,8 @@ class Equilibria:
         # loads, motions and laws of the user's may fail on one rank
         with together(problem.surface.comm):
             problem.surface.refuse_driven(t)
-            if self._curved is not None:
-                return self._solve_nonlinear(self._curved, old, t)
+            if problem.static_load.internal is not None:
+                return self._solve_nonlinear(old, t)
             step = StepProblem(
                 A=self._K,
                 b=problem.static_load.load.at_rest(t),
@@ -239,16 +231,24 @@ class Equilibria:
             certificate=certificate.worst,
         )
 
-    def _solve_nonlinear(self, solver: NonlinearSolver, old: State, t: float) -> State:
+    def _solve_nonlinear(self, old: State, t: float) -> State:
         """Return the equilibrium of a body that is not linear at a time.
 
         Args:
-            solver: of its stages.
             old: the state before.
             t: the time [s].
         """
         stage = self._pose_stage(old, t)
-        step, certified = solver.solve(stage)
+        if self.curved is None:
+            self.curved = NonlinearSolver(
+                self._problem,
+                stage,
+                [self._solver],
+                self._tolerance,
+                system=self._problem.static_load,
+                advice=ADVICE_NONLINEAR,
+            )
+        step, certified = self.curved.solve(stage)
         answer = complete(stage, step, certified.result)
         rest = np.zeros_like(old.u)
         return State(

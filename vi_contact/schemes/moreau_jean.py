@@ -8,7 +8,8 @@
 
 In x = v1:  A = M + theta dt C + theta² dt² K,  bound = -e B_n v0 on closed points and +inf
 elsewhere,  r = P [N s],  scale = dt; the state keeps the mean reactions P/dt, and its active points
-are those that carry an impulse. Restitution is a law for nodes: on a fine mesh it has no
+are those that carry an impulse. The internal force of a body that is not linear is
+p((1 - theta) u0 + theta u1). Restitution is a law for nodes: on a fine mesh it has no
 macroscopic effect. Order 2 without contact at theta = ½, else 1.
 
 Energy:  E1 - E0 = Δu·f_θ - dt v_θ·C v_θ - P·B v_θ - (theta - ½)(Δv·M Δv + Δu·K Δu)

@@ -14,21 +14,27 @@ certificate is that of the nonlinear equations: ``kkt_residual`` with rest(d) in
 b - A d.
 
 A is m M + c C + k K with the reference stiffness K, whose factor is made once. Passes with it
-converge linearly and are accelerated (D. G. Anderson, 1965, Iterative procedures for nonlinear
-integral equations). Where the passes that are still expected would cost more than a new factor,
-counted by unknowns and never by a clock, and where a pass does not help, K is replaced by the
-tangent p'(u). Of a pass with a tangent that does not help only a part of the way is gone, as far as
-the certificate's own residual becomes smaller.
+converge linearly and are accelerated (``acceleration``). K is replaced by the tangent p'(u) where
+the passes that are still expected would cost more than a new factor, counted by unknowns and never
+by a clock, and where a pass has no smaller residual than the best one before it.
+
+From such a pass only a part may be gone. Between d_k and d_k + delta, which both are outside of the
+obstacle, the potential of all forces falls at first, if A is positive definite, with the slope
+-(rest - B_tᵀ scale r_t)·delta. The whole way is gone where its slope at the end is negative or
+small, else as far as that (M. A. Crisfield, Non-linear Finite Element Analysis of Solids and
+Structures 1, 1991, section 9.2). The first pass, which brings d out of a moved obstacle, is gone as
+a whole where the forces at its end are numbers.
 """
 
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import isfinite
 from math import log as ln
 
 import numpy as np
 
-from ..core.algebra import Array, EffectiveMatrix, Mask
+from ..core.algebra import Array, EffectiveMatrix, Mask, Matrix, largest
 from ..core.certificate import Certificate
 from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
@@ -36,14 +42,15 @@ from ..core.stage import Stage, find_rest, make_matrix, pose
 from ..core.step import Solver, StepProblem, StepResult
 from ..core.system import SemiDiscreteSystem
 from ..core.verify import kkt_residual
+from .acceleration import Anderson
 from .certified import ADVICE, NEAR, Certified, CertifiedSolver
 
 log = logging.getLogger(__name__)
 
 MOST = 60  # passes of a step
-DEPTH = 5  # passes that the acceleration remembers
-HALVINGS = 10  # of a pass that does not help
-ARMIJO = 1e-2  # of the part of a pass: the part of the residual that it must take away
+PARTS = 12  # of a pass that are tried, at most
+FLAT = 0.5  # of the slope at the start of a pass: one at its end that is small
+INSIDE = 0.1  # of the bracket of a part: how near to its ends the next part may be
 SETTLED = 0.5  # of the residual before: a pass that gains less brings no more digits
 # Passes with the reference that a new tangent with its factor costs, over the root of the unknowns
 # over their logarithm in the plane, and over their power 2/3 in space (measured: 15 and 45 passes
@@ -51,48 +58,25 @@ SETTLED = 0.5  # of the residual before: a pass that gains less brings no more d
 PLANE = 1.05
 SPACE = 0.061
 MARGIN = 4.0  # passes that a tangent needs itself
+# The share of the reference in tangents, each tried where the one before was of no use. All but the
+# first are braced at the contact.
+SHARES = (0.0, 0.0, 0.1, 0.4)
+BRACE = 10.0  # of the stiffness of a closed point: that of a spring which braces a tangent there
 
 
-@dataclass
-class Anderson:
-    """Extrapolate passes d -> d + delta(d) from the last few of them.
-
-    The next d is that of the affine combination of the last passes whose delta is the smallest in
-    the Euclidean norm over all ranks.
+@dataclass(frozen=True)
+class Place:
+    """Hold an increment, from which a pass may start or to which it has led.
 
     Attributes:
-        sum_over_ranks: adds up arrays over all ranks.
-        points: the last d.
-        changes: their delta.
+        d: the increment (n,).
+        rest: rest(d) (n,).
+        active: the contact set (m,) that is expected.
     """
 
-    sum_over_ranks: object
-    points: list[Array]
-    changes: list[Array]
-
-    def extrapolate(self, d: Array, delta: Array) -> Array:
-        """Return where the next pass starts. Collective.
-
-        Args:
-            d: where this pass started (n,).
-            delta: what it changed (n,).
-        """
-        self.points.append(d)
-        self.changes.append(delta)
-        del self.points[: -DEPTH - 1]
-        del self.changes[: -DEPTH - 1]
-        if len(self.points) == 1:
-            return d + delta
-
-        # Least squares by the normal equations of the differences, which are few; directions that
-        # are lost to rounding are left out.
-        of_points = np.diff(np.array(self.points), axis=0)
-        of_changes = np.diff(np.array(self.changes), axis=0)
-        products = np.column_stack([of_changes @ of_changes.T, of_changes @ delta])
-        products = self.sum_over_ranks(products)  # type: ignore[operator]
-        weights = np.linalg.lstsq(products[:, :-1], products[:, -1], rcond=1e-12)[0]
-        step: Array = delta - weights @ (of_points + of_changes)
-        return d + step
+    d: Array
+    rest: Array
+    active: Mask
 
 
 @dataclass(frozen=True)
@@ -100,16 +84,59 @@ class Pass:
     """Hold where a pass has led.
 
     Attributes:
-        d: the increment (n,).
-        rest: rest(d) (n,).
+        place: its end.
         result: its answer, with x = d.
         certificate: of the nonlinear step.
     """
 
-    d: Array
-    rest: Array
+    place: Place
     result: StepResult
     certificate: Certificate
+
+
+@dataclass
+class Walk:
+    """Hold how far the passes of one step have come.
+
+    Attributes:
+        stage: the balance.
+        whole: the step at the guess.
+        here: where the next pass starts.
+        base: the last place that no extrapolation has made.
+        outside: whether ``base`` is outside of the obstacle, as the end of every pass is.
+        solver: of the passes.
+        A: their matrix.
+        acceleration: what the passes with this matrix have shown.
+        best: the pass with the smallest residual, None before the first one.
+        rate: its residual over the one before; 1 where nothing is known of it.
+        tangent_due: whether the next pass is one with a new tangent.
+        care: how many tangents were of no use: place in ``SHARES`` of the next one.
+        escalated: whether a pass was by a method that was escalated to.
+    """
+
+    stage: Stage
+    whole: StepProblem
+    here: Place
+    base: Place
+    solver: CertifiedSolver
+    A: EffectiveMatrix
+    acceleration: Anderson
+    outside: bool = False
+    best: Pass | None = None
+    rate: float = 1.0
+    tangent_due: bool = False
+    care: int = 0
+    escalated: bool = False
+
+    @property
+    def least(self) -> float:
+        """Return the smallest residual so far."""
+        return np.inf if self.best is None else self.best.certificate.worst
+
+    @property
+    def refused(self) -> bool:
+        """Say whether tangents are of no use in this step."""
+        return self.care == len(SHARES)
 
 
 class NonlinearSolver:
@@ -117,7 +144,7 @@ class NonlinearSolver:
 
     Attributes:
         tangents: how many tangents have been made.
-        passes: how many linear steps.
+        counts: how many linear steps each step took.
     """
 
     def __init__(
@@ -146,7 +173,7 @@ class NonlinearSolver:
         self._tolerance = tolerance
         self._advice = advice
         self.tangents = 0
-        self.passes = 0
+        self.counts: list[int] = []
         self.A = make_matrix(self._system, stage)
         self._reference = self._prepare(stage, self.A)
         self._cost = _count_passes_of_a_factor(problem)
@@ -163,209 +190,319 @@ class NonlinearSolver:
         Raises:
             StepFailure: no pass came below the tolerance, or a linear step has no answer.
         """
-        whole = pose(self._problem, stage, self.A, self._system)
-        aim = NEAR * self._tolerance
-        here = self._start(whole)
-        best: Pass | None = None
-        before = np.inf
-        escalated = False
-        solver = self._reference
-        A = self.A
-        may_be_tangent = True
-        accelerate = self._begin_acceleration()
+        walk = self._begin(stage)
         for count in range(1, MOST + 1):
-            try:
-                linear = solver.solve(self._pose_about(whole, here, A))
-            except (InputError, StepFailure) as refusal:
-                # A tangent that is not positive, as that of a body about to buckle, has no factor
-                # or no answer: the reference goes on from here, without tangents.
-                if solver is self._reference:
-                    raise
-                log.debug("step %d: a tangent is of no use (%s)", whole.k, refusal)
-                solver = self._reference
-                A = self.A
-                may_be_tangent = False
-                accelerate = self._begin_acceleration()
+            there = self._make_pass(walk)
+            if there is None:
                 continue
-            escalated = escalated or linear.escalated
-            self.passes += 1
-            there = self._judge(stage, whole, here, linear.result)
-            worst = there.certificate.worst
-            settled = best is not None and worst > SETTLED * best.certificate.worst
-            if best is None or worst < best.certificate.worst:
-                best = there
-            certified = best.certificate.worst <= self._tolerance
-            if worst <= aim or (certified and settled):
-                return whole, self._finish(whole, best, count, escalated)
-
-            # A pass that does not help: the reference is too soft or too stiff, and a tangent takes
-            # its place; with a tangent, only a part of the way is gone.
-            helps = worst < before
-            if helps:
-                here = self._move(stage, here, there, accelerate)
-            elif solver is not self._reference or not np.isfinite(worst):
-                there = self._shorten(stage, whole, here, linear.result, before)
-                worst = there.certificate.worst
-                here = there
-            wanted = not helps or self._wants_tangent(worst, before, aim)
-            if wanted and may_be_tangent:
-                A = self._make_tangent(stage, here)
-                solver = self._prepare(stage, A)
-                accelerate = self._begin_acceleration()
-            before = worst if helps or here is there else before
-        reached = "" if best is None else f" ({best.certificate})"
+            if self._is_answer(walk, there):
+                return walk.whole, self._finish(walk, count)
+            if walk.best is there:
+                self._extrapolate(walk, there)
+            else:
+                self._fall_back(walk, there)
+        self.counts.append(MOST)
+        reached = "" if walk.best is None else f" ({walk.best.certificate})"
+        if walk.care:
+            reached += "; its tangent is not positive there, as that of a body that gives way"
         raise StepFailure(
-            f"step {whole.k} at t = {whole.t:.6g} s of a body that is not linear did not come "
-            f"below the certificate tolerance {self._tolerance:g} in {MOST} linear steps{reached}: "
-            f"{self._advice}"
+            f"{_name(walk)} did not come below the certificate tolerance {self._tolerance:g} in "
+            f"{MOST} linear steps{reached}: {self._advice}"
         )
 
-    def _shorten(
-        self, stage: Stage, whole: StepProblem, here: Pass, result: StepResult, before: float
-    ) -> Pass:
-        """Return the longest part of a pass that makes the residual of the certificate smaller.
-
-        Displacements and reactions go the same part of their way. Collective.
-
-        Args:
-            stage: the balance.
-            whole: the step at the guess.
-            here: where the pass started.
-            result: the answer of its linear step.
-            before: the residual where it started; infinite where nothing is known of it.
+    def _begin(self, stage: Stage) -> Walk:
+        """Return the walk that begins at the guess of a stage. Collective.
 
         Raises:
-            StepFailure: no part helps.
+            StepFailure: the internal force is no number there, as that of a body inside out.
         """
-        old = here.result
-        for part in 0.5 ** np.arange(1, HALVINGS + 1):
-            r_t = result.r_t
-            if r_t is not None:
-                r_t = part * r_t if old.r_t is None else old.r_t + part * (r_t - old.r_t)
-            shorter = replace(
-                result,
-                x=part * result.x,
-                r_n=old.r_n + part * (result.r_n - old.r_n),
-                r_t=r_t,
+        whole = pose(self._problem, stage, self.A, self._system)
+        start = Place(whole.guess, whole.b, whole.active)
+        walk = Walk(stage, whole, start, start, self._reference, self.A, self._make_acceleration())
+        if whole.internal is not None and not self._is_finite(whole.internal):
+            raise StepFailure(
+                f"{_name(walk)} begins where its internal force is NaN or infinite: {self._advice}"
             )
-            there = self._judge(stage, whole, here, shorter)
-            if there.certificate.worst < (1.0 - ARMIJO * part) * before:
-                return there
-        raise StepFailure(
-            f"step {whole.k} at t = {whole.t:.6g} s of a body that is not linear: no part of a "
-            f"linear step makes the residual {before:.1e} smaller: {self._advice}"
-        )
+        return walk
 
-    def _begin_acceleration(self) -> Anderson:
-        return Anderson(self._problem.surface.comm.sum, [], [])
+    def _make_acceleration(self) -> Anderson:
+        return Anderson(self._problem.surface.comm.sum)
 
-    def _start(self, whole: StepProblem) -> Pass:
-        """Return the guess as a pass that has led nowhere yet."""
-        surface = whole.surface
-        none = StepResult(whole.guess, np.zeros(surface.count), whole.active, 0, "")
-        return Pass(whole.guess, whole.b, none, Certificate(np.inf, 0.0, 0.0, 0.0))
+    def _is_finite(self, x: Array) -> bool:
+        """Tell whether a vector (n,) is finite on all ranks. Collective."""
+        return not largest(self._problem.surface.comm, not isfinite(x.sum()))
 
-    def _pose_about(self, whole: StepProblem, here: Pass, A: EffectiveMatrix) -> StepProblem:
-        """Return the linear step about an increment.
+    def _make_pass(self, walk: Walk) -> Pass | None:
+        """Return where the next pass leads; None where there is none, and another way is open.
 
-        Args:
-            whole: the step at the guess.
-            here: the increment, with its rest.
-            A: the matrix of the pass.
+        Collective.
+
+        Raises:
+            InputError, StepFailure: a pass with the reference has no answer.
         """
-        surface = whole.surface
-        slip0 = whole.slip0
-        if slip0 is not None:
-            slip0 = slip0 - surface.tangential_values(here.d)
-        origin = here.d if whole.origin is None else whole.origin + here.d
-        return replace(
-            whole,
-            A=A,
-            b=here.rest,
-            bound=whole.bound - surface.normal_values(here.d),
-            slip0=slip0,
-            active=here.result.active,
-            origin=origin,
-        )
+        try:
+            if walk.tangent_due:
+                self._take_tangent(walk)
+            linear = walk.solver.solve(self._pose_about(walk))
+        except (InputError, StepFailure) as refusal:
+            # A tangent that is not positive has no factor or no answer.
+            if walk.solver is self._reference and walk.here is walk.base and not walk.tangent_due:
+                raise
+            log.debug("%s: a pass is of no use (%s)", _name(walk), refusal)
+            self._refuse_tangent(walk)
+            return None
+        walk.escalated = walk.escalated or linear.escalated
+        return self._judge(walk, linear.result)
 
-    def _judge(self, stage: Stage, whole: StepProblem, here: Pass, result: StepResult) -> Pass:
-        """Return where a linear step has led, with the certificate of the equations as they are.
-
-        Args:
-            stage: the balance.
-            whole: the step at the guess.
-            here: where the linear step began.
-            result: its answer.
-        """
-        surface = whole.surface
-        d = here.d + result.x
-
-        # Rounding of the sum must not open a closed point, nor move one that sticks.
-        closed: Mask = surface.normal_values(result.x) == whole.bound - surface.normal_values(
-            here.d
-        )
-        surface.put_normal(d, whole.bound, closed)
-        if whole.slip0 is not None:
-            slip0 = whole.slip0 - surface.tangential_values(here.d)
-            sticks = surface.tangential_values(result.x) == slip0
-            surface.put_tangential(d, whole.slip0, sticks)
-        rest = find_rest(self._system, stage, d)
-        answer = replace(result, x=d)
-        return Pass(d, rest, answer, kkt_residual(whole, answer, whole.b - rest))
-
-    def _move(self, stage: Stage, here: Pass, there: Pass, accelerate: Anderson) -> Pass:
-        """Return from where the next pass starts. Collective.
-
-        Args:
-            stage: the balance.
-            here: where this pass started.
-            there: where it led.
-            accelerate: what the passes before say.
-        """
-        d = accelerate.extrapolate(here.d, there.d - here.d)
-        if len(accelerate.points) == 1:
-            return there
-        return replace(there, d=d, rest=find_rest(self._system, stage, d))
-
-    def _wants_tangent(self, worst: float, before: float, aim: float) -> bool:
-        """Tell whether the passes that are still expected cost more than a new factor.
-
-        With the rate of the last pass so many are expected: log(aim/worst) / log(worst/before).
-
-        Args:
-            worst: residual now.
-            before: that of the pass before; infinite for the first one.
-            aim: the residual to come to.
-        """
-        if not np.isfinite(before):
-            return False
-        if not worst < before:
-            return True
-        return ln(aim / worst) / ln(worst / before) > self._cost + MARGIN
-
-    def _make_tangent(self, stage: Stage, here: Pass) -> EffectiveMatrix:
-        """Return A with the tangent at an increment."""
-        system = self._system
-        if system.internal is None:
-            return self.A
-        self.tangents += 1
-        u = stage.u(here.d)
+    def _take_tangent(self, walk: Walk) -> None:
+        """Go on with the tangent of where the walk is. Collective."""
+        stage = walk.stage
+        internal = self._system.internal
+        assert internal is not None  # linear bodies have no walk
+        u = stage.u(walk.here.d)
         if stage.old is not None:
             share, u0 = stage.old
             u = u - share * u0
-        return make_matrix(system, stage, system.internal.tangent(u))
+        self.tangents += 1
+        walk.solver = self._reference  # the tangent before gives its memory back
+        tangent = internal.tangent(u)
+        if walk.care:
+            tangent = self._brace(tangent, walk.here.active, SHARES[walk.care])
+        walk.A = make_matrix(self._system, stage, tangent)
+        walk.solver = self._prepare(stage, walk.A)
+        walk.acceleration = self._make_acceleration()
+        walk.tangent_due = False
 
-    def _finish(self, whole: StepProblem, best: Pass, count: int, escalated: bool) -> Certified:
-        """Return the best pass as the certified answer of the step."""
-        log.debug(
-            "step %d at t = %.6g s: %d linear steps, residual %.1e",
-            whole.k,
-            whole.t,
-            count,
-            best.certificate.worst,
+    def _brace(self, tangent: Matrix, closed: Mask, share: float) -> Matrix:
+        """Return a tangent with stiff springs at closed points, and a share of the reference.
+
+        Without its contact a compressed body may be about to buckle. The springs change nothing in
+        the answer of a pass whose closed points stay closed, as these do not move then.
+
+        Args:
+            tangent: p'(u).
+            closed: (m,) points.
+            share: of K, in the place of as much of the tangent.
+        """
+        system = self._system
+        rows = self._problem.surface.owned[closed]
+        springs = BRACE * np.abs(system.K.diagonal()[rows])
+        brace = system.algebra.local(rows, rows, springs, system.rows)
+        return system.algebra.combine([(1.0 - share, tangent), (share, system.K), (1.0, brace)])
+
+    def _refuse_tangent(self, walk: Walk) -> None:
+        """Go on from the last place that was no extrapolation, with a tangent of more care.
+
+        Where there is none the reference makes all further passes.
+        """
+        walk.here = walk.base
+        walk.care += 1
+        walk.tangent_due = not walk.refused
+        if walk.refused:
+            walk.solver = self._reference
+            walk.A = self.A
+        walk.acceleration = self._make_acceleration()
+
+    def _pose_about(self, walk: Walk) -> StepProblem:
+        """Return the linear step about where the walk is."""
+        whole = walk.whole
+        surface = whole.surface
+        here = walk.here
+        slip0 = whole.slip0
+        if slip0 is not None:
+            slip0 = slip0 - surface.tangential_values(here.d)
+        return replace(
+            whole,
+            A=walk.A,
+            b=here.rest,
+            bound=whole.bound - surface.normal_values(here.d),
+            slip0=slip0,
+            active=here.active,
+            origin=here.d if whole.origin is None else whole.origin + here.d,
         )
-        result = replace(best.result, iterations=count)
-        return Certified(result, best.certificate, escalated)
+
+    def _judge(self, walk: Walk, result: StepResult) -> Pass:
+        """Return where a linear step has led, with the certificate of the equations as they are.
+
+        Args:
+            walk: so far.
+            result: the answer of the step.
+        """
+        whole = walk.whole
+        surface = whole.surface
+        d0 = walk.here.d
+        d = d0 + result.x
+
+        # Rounding of the sum must not open a closed point, nor move one that sticks.
+        bound = whole.bound - surface.normal_values(d0)
+        closed: Mask = surface.normal_values(result.x) == bound
+        surface.put_normal(d, whole.bound, closed)
+        if whole.slip0 is not None:
+            slip0 = whole.slip0 - surface.tangential_values(d0)
+            sticks = surface.tangential_values(result.x) == slip0
+            surface.put_tangential(d, whole.slip0, sticks)
+        rest = find_rest(self._system, walk.stage, d)
+        answer = replace(result, x=d)
+        certificate = kkt_residual(whole, answer, whole.b - rest)
+        return Pass(Place(d, rest, result.active), answer, certificate)
+
+    def _is_answer(self, walk: Walk, there: Pass) -> bool:
+        """Take a pass into account, and tell whether the best one is the answer.
+
+        It is one far below the tolerance, or below it where this pass gains nothing more.
+        """
+        worst = there.certificate.worst
+        before = walk.least
+        if worst < before:
+            walk.rate = worst / before if isfinite(before) else 1.0
+            walk.best = there
+        if worst <= NEAR * self._tolerance:
+            return True
+        return walk.least <= self._tolerance and worst > SETTLED * before
+
+    def _extrapolate(self, walk: Walk, there: Pass) -> None:
+        """Go on from the best pass so far, or from where it points to. Collective."""
+        end = there.place
+        start = walk.here
+        walk.base = end
+        walk.here = end
+        walk.outside = True
+        d = walk.acceleration.extrapolate(start.d, end.d - start.d)
+        if len(walk.acceleration.points) > 1:
+            rest = find_rest(self._system, walk.stage, d)
+            if self._is_finite(rest):
+                walk.here = Place(d, rest, end.active)
+        walk.tangent_due = self._wants_tangent(walk)
+
+    def _wants_tangent(self, walk: Walk) -> bool:
+        """Tell whether the passes that are still expected cost more than a new factor.
+
+        With the rate of the best pass so many are expected: log(aim/residual) / log(rate).
+        """
+        if walk.rate == 1.0 or walk.refused:
+            return False
+        left = ln(NEAR * self._tolerance / walk.least) / ln(walk.rate)
+        return left > self._cost + MARGIN
+
+    def _fall_back(self, walk: Walk, there: Pass) -> None:
+        """Go on after a pass that was not the best. Collective.
+
+        An extrapolation that led there is given up; else a part of the way is gone.
+        """
+        if walk.here is walk.base:
+            walk.base = self._shorten(walk, there)
+        walk.here = walk.base
+        walk.acceleration = self._make_acceleration()
+        walk.tangent_due = not walk.refused
+
+    def _shorten(self, walk: Walk, there: Pass) -> Place:
+        """Return how far to go towards the end of a pass. Collective.
+
+        Args:
+            walk: which is at its start.
+            there: its end.
+
+        Raises:
+            StepFailure: no part of the way leads to forces that are numbers, or down.
+        """
+        start = walk.here
+        end = there.place
+        way = end.d - start.d
+        first = self._find_slope(there, start.rest, way)
+        last = self._find_slope(there, end.rest, way)
+        if not walk.outside and isfinite(last):
+            walk.outside = True
+            return end
+        if walk.outside and not first < 0.0:
+            # A tangent that is not positive leads up. Passes of the reference do not, but with
+            # friction, which has no energy.
+            if walk.solver is self._reference and isfinite(last):
+                return end
+            self._refuse_tangent(walk)
+            return start
+        if last <= FLAT * abs(first):
+            return end
+
+        return self._find_flat(walk, there, first, last)
+
+    def _find_flat(self, walk: Walk, there: Pass, first: float, last: float) -> Place:
+        """Return a place on the way of a pass where the slope is small. Collective.
+
+        It lies between a part of the way with a negative slope and one with a positive slope or
+        none: by the secant and by halves in turn. Where none is found so, it is the last place with
+        a negative slope.
+
+        Args:
+            walk: which is at the start of the pass.
+            there: its end.
+            first: slope at the start, negative where the start is outside of the obstacle.
+            last: slope at the end.
+
+        Raises:
+            StepFailure: there is no such place.
+        """
+        start = walk.here
+        way = there.place.d - start.d
+        low = 0.0
+        low_slope = first
+        high = 1.0
+        high_slope = last
+        lowest: Place | None = None
+        for turn in range(PARTS):
+            share = 0.5
+            if turn % 2 == 0 and isfinite(high_slope):
+                share = low_slope / (low_slope - high_slope)
+                share = min(max(share, INSIDE), 1.0 - INSIDE)
+            part = low + share * (high - low)
+            d = start.d + part * way
+            place = Place(d, find_rest(self._system, walk.stage, d), there.place.active)
+            slope = self._find_slope(there, place.rest, way)
+            if abs(slope) <= FLAT * abs(first) or (not walk.outside and isfinite(slope)):
+                return place
+            if slope < 0.0:
+                low = part
+                low_slope = slope
+                lowest = place
+            else:
+                high = part
+                high_slope = slope
+        if lowest is None:
+            raise StepFailure(
+                f"{_name(walk)}: no part of a linear step leads to less energy: {self._advice}"
+            )
+        return lowest
+
+    def _find_slope(self, there: Pass, rest: Array, way: Array) -> float:
+        """Return the slope of the potential along a way, -(rest - B_tᵀ scale r_t)·way. Collective.
+
+        Infinite where it is no number.
+
+        Args:
+            there: the pass, whose tangential reactions are loads here.
+            rest: rest(d) (n,) where the slope is asked for.
+            way: of the pass (n,).
+        """
+        surface = self._problem.surface
+        force = rest
+        if there.result.r_t is not None:
+            nothing = np.zeros_like(there.result.r_n)
+            force = rest - surface.reaction_load(nothing, len(rest), there.result.r_t)
+        slope = -self._system.algebra.dot(force, way)
+        return slope if isfinite(slope) else np.inf
+
+    def _finish(self, walk: Walk, count: int) -> Certified:
+        """Return the best pass as the certified answer of the step."""
+        best = walk.best
+        assert best is not None  # it is the answer
+        log.debug("%s: %d linear steps, %s", _name(walk), count, best.certificate)
+        self.counts.append(count)
+        return Certified(replace(best.result, iterations=count), best.certificate, walk.escalated)
+
+
+def _name(walk: Walk) -> str:
+    """Return the step in words."""
+    whole = walk.whole
+    return f"step {whole.k} at t = {whole.t:.6g} s of a body that is not linear"
 
 
 def _count_passes_of_a_factor(problem: ContactProblem) -> float:

@@ -26,6 +26,7 @@ from dolfinx.mesh import Mesh
 from ...core.algebra import Array, from_each
 from ...core.checks import instance
 from ...core.collective import Parts, agree
+from ...core.errors import InputError
 from ...core.quantities import Unit
 from ...core.system import Load, SemiDiscreteSystem
 from ...core.timing import report_time
@@ -252,12 +253,7 @@ def assemble(
         tied=space.tied_unknowns,
         absolute=any(boundary.lets_waves_in for boundary in conditions.dashpots),
         notes=describe_boundaries(conditions.dashpots, comm.rank, notes),
-        companions=tuple(
-            chain(
-                *(condition.companions for condition in conditions.prescribed),
-                *(boundary.companions for boundary in acting),
-            )
-        ),
+        companions=_gather_companions(body, conditions.prescribed, acting),
         statics_only=body.statics_only,
         internal=body.internal,
     )
@@ -267,6 +263,28 @@ def assemble(
     del absorbers, reduced
     give_back(mesh.comm)
     return system
+
+
+def _gather_companions(
+    body: ElasticForms, prescribed: Sequence[Prescribed], acting: Sequence[Any]
+) -> tuple[Any, ...]:
+    """Return the motions that are marched beside the run.
+
+    Args:
+        body: its forms.
+        prescribed: motions of supports.
+        acting: loads of absorbing boundaries.
+
+    Raises:
+        InputError: there are such motions beside a body that is not linear.
+    """
+    companions = [companion for part in (*prescribed, *acting) for companion in part.companions]
+    if companions and body.internal is not None:
+        raise InputError(
+            "Forms: internal does not go with motions that are marched beside the run, such as a "
+            "free field, as these are linear: take fem.Dashpots there"
+        )
+    return tuple(companions)
 
 
 @dataclass(frozen=True, eq=False)

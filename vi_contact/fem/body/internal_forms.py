@@ -66,7 +66,7 @@ class InternalForms:
 
     def _put(self, u: Array) -> None:
         """Write free unknowns (n,) into the Function of the forms, ghosts too. Collective."""
-        full = self._space.elimination.expand(u, np.zeros(self._space.free.size))
+        full = self._space.expand(u, 0.0)  # nothing that is held moves: any time will do
         self._u.x.array[: full.size] = full.ravel()
         self._u.x.scatter_forward()
 

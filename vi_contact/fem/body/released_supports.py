@@ -145,6 +145,8 @@ def begin_from(
 def _compute_missing(problem: ContactProblem, u0: Array, state: State, was_held: Mask) -> Array:
     """Return F = K u_0 - f(0) + B_nᵀ r_n + B_tᵀ r_t (n,) [N]. Collective.
 
+    Of a body that is not linear p(u_0) takes the place of K u_0.
+
     Args:
         problem: the problem that begins.
         u0: (n,) where it begins [m].
@@ -154,7 +156,7 @@ def _compute_missing(problem: ContactProblem, u0: Array, state: State, was_held:
     Raises:
         InputError: it is not zero and nothing was held.
     """
-    elastic = problem.system.K @ u0
+    elastic = problem.system.internal_force(u0)
     force = np.asarray(elastic - problem.system.load.at_rest(0.0) + _contact_force(problem, state))
     sizes = np.array([max_abs(force[~was_held]), max_abs(elastic), max_abs(force)])
     missing, *largest_forces = problem.surface.comm.max(sizes)
@@ -188,7 +190,8 @@ def find_removed_support(
     nodal = np.zeros(new.held.size)
     nodal[new.free] = force
     # forces that are round-off of these are none
-    size = largest(new.comm, max(max_abs(after.system.K @ after.system.u0), max_abs(force)))
+    elastic = after.system.internal_force(after.system.u0)
+    size = largest(new.comm, max(max_abs(elastic), max_abs(force)))
     # of each support, and of the ties that are gone, what of the force is on what it held
     untied = np.isin(old.nodes, np.setdiff1d(old.tied_nodes, new.tied_nodes)), slice(None)
     supports = [(support.condition.name, support.places) for support in old.supports]

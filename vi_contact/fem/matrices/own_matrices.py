@@ -24,7 +24,7 @@ from ...core.algebra import (
     largest,
     total,
 )
-from ...core.checks import array, integers, on_all, provides, refuse
+from ...core.checks import array, integers, on_all, provides, quote, refuse
 from ...core.errors import InputError
 from ...core.internal import InternalForce
 from ...core.matrix_checks import SYMMETRIC, find_matrix_defects, measure_asymmetry
@@ -132,8 +132,12 @@ class FreeRows:
         return whole
 
     def force(self, u: Array) -> Array:
-        """Return p(u) [N] of the free rows."""
-        p = array(OWNER, "internal.force(u)", self.internal.force(self._fill(u)), (self.size,))
+        """Return p(u) [N] of the free rows; it need not be finite where a body is inside out."""
+        p = np.asarray(self.internal.force(self._fill(u)))
+        if p.shape != (self.size,) or p.dtype.kind not in "iuf":
+            raise InputError(
+                f"{OWNER}: internal.force(u) returned {quote(p)}; return {self.size} real numbers"
+            )
         return np.asarray(p[self.rows], dtype=float)
 
     def energy(self, u: Array) -> float:
@@ -144,6 +148,11 @@ class FreeRows:
         """Return p'(u) [N/m] of the free rows."""
         tangent: Any = self.internal.tangent(self._fill(u))
         csr = tangent.csr if isinstance(tangent, SerialMatrix) else sp.csr_matrix(tangent)
+        if csr.shape != (self.size, self.size):
+            raise InputError(
+                f"{OWNER}: internal.tangent(u) has shape {csr.shape}; return the derivative of "
+                f"internal.force, of shape {(self.size, self.size)}"
+            )
         return SerialMatrix(csr[self.rows][:, self.rows].tocsr())
 
 

@@ -74,8 +74,12 @@ class NodalWork:
                 cells.
 
         Raises:
-            InputError: another system, loads on another mesh, a gravity of another dimension.
+            InputError: another system, loads on another mesh, a gravity of another dimension, and
+                a body that is not linear.
         """
+        problem.system.refuse_nonlinear(
+            owner, "leave them out, and integrate the stress of the body yourself"
+        )
         space = space_of("NodalWork", problem.system)
         warn_of_other_matrices("reactions and section forces", problem.system, "MCK")
         self._problem = problem

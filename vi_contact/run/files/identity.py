@@ -34,6 +34,7 @@ SAMPLES = 256  # times of functions of time alone, all over the run
 EARLY = 5  # times of other loads, which may have to be marched to: in the first steps
 STEPS = 32  # how many steps are the first ones
 FIXED = ("unknowns", "contact points")  # what a restart can by no means change
+STRETCH = 0.02  # by which the internal force of a body that is not linear is looked at
 SHOWN = 300  # characters of a law in a sentence
 SPEEDS = (0.0, 1e-3, 1e-1, 10.0)  # slip rates [m/s] at which friction is looked at
 _NUMBER = re.compile(r"(\d[\d.]*(?:[eE][-+]?\d+)?)")
@@ -81,6 +82,7 @@ def identify(
         "impact law": write_as_text(problem.impact),
         "friction law": write_as_text(friction),
         "stiffness": [_multiply(system, w, system.K @ x) for w, x in pairs],
+        "internal force": _describe_internal(system, probes[0]),
         "mass matrix": [_multiply(system, w, system.M @ x) for w, x in pairs],
         "damping": []
         if system.C is None
@@ -145,6 +147,20 @@ def _multiply(system: SemiDiscreteSystem, w: Array, x: Array) -> tuple[float, fl
     """Return w·x of vectors (n,) and |w| |x|, the size of it. Collective."""
     dot = system.algebra.dot
     return dot(w, x), float(np.sqrt(dot(w, w) * dot(x, x)))
+
+
+def _describe_internal(system: SemiDiscreteSystem, w: Array) -> Numbers:
+    """Return w·p(u) and W(u) of a uniform stretch u; nothing of a linear body. Collective.
+
+    Args:
+        system: whose internal force it is.
+        w: a probe (n,).
+    """
+    if system.internal is None:
+        return []
+    u = STRETCH * np.sum(system.influence * system.space.coordinates, axis=1)
+    energy = system.internal.energy(u)
+    return [_multiply(system, w, system.internal.force(u)), (energy, abs(energy))]
 
 
 def _describe_loads(
