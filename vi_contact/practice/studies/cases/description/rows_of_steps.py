@@ -8,7 +8,7 @@ from typing import Any
 from ....units.report_units import write_number
 from .pen import Model, Pen, Row, list_objects, say
 
-_LONG_NUMBER = re.compile(r"\d+\.\d{5,}(?:e-?\d+)?")  # as a program writes one
+_LONG_NUMBER = re.compile(r"(?<!\d)\d{1,20}\.\d{5,}(?:e-?\d{1,3})?")  # as a program writes one
 
 
 def _shorten_numbers(text: str) -> str:
