@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from demos.parts.problems.nonlinear import Rubber, hang_block, throw_block
-from vi_contact import fem, vi
+from vi_contact import fem, soil, vi
 from vi_contact.core.algebra import max_abs, total
 from vi_contact.core.errors import InputError
 from vi_contact.fem import compat
@@ -231,6 +231,15 @@ def test_what_takes_linear_forces_is_refused() -> None:
     mesh = system.space.mesh  # type: ignore[attr-defined]
     with pytest.raises(InputError, match="does not go with supports that move"):
         fem.assemble(mesh, forms=RUBBER.make_forms(), prescribed=moved)
+    shake = vc.Harmonic(1.0, 2.0)
+    with pytest.raises(InputError, match="marched beside the run"):
+        fem.assemble(
+            mesh,
+            vc.LinearElastic(E=RUBBER.E, nu=RUBBER.nu, rho=RUBBER.rho),
+            forms=RUBBER.make_forms(),
+            clamped=tags["bottom"],
+            dashpots=[soil.FreeField(tags["left"], base=shake)],
+        )
 
 
 @pytest.mark.serial
