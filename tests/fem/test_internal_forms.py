@@ -12,12 +12,13 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from demos.parts.problems.nonlinear import Rubber, hang_block, throw_block
-from vi_contact import fem, vi
-from vi_contact.core.algebra import max_abs
+from vi_contact import fem, soil, vi
+from vi_contact.core.algebra import max_abs, total
 from vi_contact.core.errors import InputError
 from vi_contact.fem import compat
 from vi_contact.fem.output.fields import VonMises
 from vi_contact.meshes.block import BlockMesh
+from vi_contact.meshes.two_blocks import TwoBlocks
 
 RUBBER = Rubber()
 
@@ -230,6 +231,15 @@ def test_what_takes_linear_forces_is_refused() -> None:
     mesh = system.space.mesh  # type: ignore[attr-defined]
     with pytest.raises(InputError, match="does not go with supports that move"):
         fem.assemble(mesh, forms=RUBBER.make_forms(), prescribed=moved)
+    shake = vc.Harmonic(1.0, 2.0)
+    with pytest.raises(InputError, match="marched beside the run"):
+        fem.assemble(
+            mesh,
+            vc.LinearElastic(E=RUBBER.E, nu=RUBBER.nu, rho=RUBBER.rho),
+            forms=RUBBER.make_forms(),
+            clamped=tags["bottom"],
+            dashpots=[soil.FreeField(tags["left"], base=shake)],
+        )
 
 
 @pytest.mark.serial
@@ -245,3 +255,42 @@ def test_forms_that_are_none_are_refused() -> None:
     wrong = fem.Forms(mass=mass, internal=lambda u, v: RUBBER.energy(u), energy=RUBBER.energy)
     with pytest.raises(InputError, match="is not linear in v alone"):
         fem.assemble(mesh, forms=wrong)
+
+
+@pytest.mark.two_ranks
+def test_two_blocks_strike(comm: Any) -> None:
+    """Forces are taken in unknowns relative to the other body: certificates and ledger say so, and
+    the momentum of both is kept."""
+    half = BlockMesh(lengths=(1.0, 0.5), divisions=(6, 3))
+    both = TwoBlocks(lower=half, upper=half, gap=0.01)
+    mesh, tags = fem.build_mesh(both, comm)
+
+    def velocity(x: np.ndarray) -> np.ndarray:
+        """The upper one falls on the other."""
+        down = np.where(x[:, 1] > 0.505, -4.0, 0.0)
+        return np.column_stack([0.0 * down, down])
+
+    system = fem.assemble(
+        mesh, forms=RUBBER.make_forms(), quadrature_degree=3, initial_velocity=velocity
+    )
+    surface = fem.contact_pair(system, tags["upper_bottom"], tags["lower_top"])
+    problem = vc.ContactProblem(system, surface)
+    stepper = vc.Stepper(problem, scheme=vc.Midpoint())
+    ledger = vc.Energy()
+    row = ledger.start(stepper.method.problem, stepper.state)
+    start = row["energy_kinetic"]
+    closed = 0
+    for _ in range(40):
+        trial = stepper.attempt(5e-4)
+        row = ledger.row(trial.report)
+        stepper.accept(trial)
+        closed += surface.some(trial.state.active)
+        assert trial.report.certificate.worst <= 1e-9
+    assert closed >= 10
+    assert row["energy_strain"] > 0.01 * start
+    assert abs(row["energy_defect"]) <= 1e-9 * start
+    v = problem.cartesian(stepper.state.v)
+    momentum = total(system.algebra.comm, system.influence[:, 1] @ (system.M @ v))
+    assert momentum == pytest.approx(
+        total(system.algebra.comm, system.influence[:, 1] @ (system.M @ system.v0)), rel=1e-9
+    )

@@ -13,6 +13,8 @@ import vi_contact as vc
 from demos.parts.problems.nonlinear import CUBIC, SPRING, CubicSprings, make_chain
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.step import Report
+from vi_contact.layer.contact_law import contact_layer
+from vi_contact.layer.scheme import BoundaryLayer
 from vi_contact.run.stepper import Stepper, Trial
 
 ELEMENTS = 40
@@ -242,3 +244,10 @@ def test_a_tangent_of_another_shape_is_refused() -> None:
         replace(problem.system.internal, internal=Wrong(springs.B, 1.0, 1.0)).tangent(  # type: ignore
             np.zeros(ELEMENTS + 1)
         )
+
+
+@pytest.mark.serial
+def test_the_boundary_layer_is_for_linear_bodies() -> None:
+    law = contact_layer(0.5, mass=2.0, speed=3.0, width=0.005)
+    with pytest.raises(InputError, match="BoundaryLayer knows linear bodies only"):
+        Stepper(make_chain(), scheme=BoundaryLayer(law=law))

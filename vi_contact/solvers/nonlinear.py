@@ -21,9 +21,8 @@ by a clock, and where a pass has no smaller residual than the best one before it
 From such a pass only a part may be gone. Between d_k and d_k + delta, which both are outside of the
 obstacle, the potential of all forces falls at first, if A is positive definite, with the slope
 -(rest - B_tᵀ scale r_t)·delta. The whole way is gone where its slope at the end is negative or
-small, else as far as that (M. A. Crisfield, Non-linear Finite Element Analysis of Solids and
-Structures 1, 1991, section 9.2). The first pass, which brings d out of a moved obstacle, is gone as
-a whole where the forces at its end are numbers.
+small, else as far as that (``line_search``). The first pass, which brings d out of a moved
+obstacle, is gone as a whole where the forces at its end are numbers.
 """
 
 import logging
@@ -44,13 +43,11 @@ from ..core.system import SemiDiscreteSystem
 from ..core.verify import kkt_residual
 from .acceleration import Anderson
 from .certified import ADVICE, NEAR, Certified, CertifiedSolver
+from .line_search import FLAT, find_finite, find_flat
 
 log = logging.getLogger(__name__)
 
 MOST = 60  # passes of a step
-PARTS = 12  # of a pass that are tried, at most
-FLAT = 0.5  # of the slope at the start of a pass: one at its end that is small
-INSIDE = 0.1  # of the bracket of a part: how near to its ends the next part may be
 SETTLED = 0.5  # of the residual before: a pass that gains less brings no more digits
 # Passes with the reference that a new tangent with its factor costs, over the root of the unknowns
 # over their logarithm in the plane, and over their power 2/3 in space (measured: 15 and 45 passes
@@ -245,11 +242,14 @@ class NonlinearSolver:
                 self._take_tangent(walk)
             linear = walk.solver.solve(self._pose_about(walk))
         except (InputError, StepFailure) as refusal:
-            # A tangent that is not positive has no factor or no answer.
-            if walk.solver is self._reference and walk.here is walk.base and not walk.tangent_due:
-                raise
             log.debug("%s: a pass is of no use (%s)", _name(walk), refusal)
-            self._refuse_tangent(walk)
+            of_tangent = walk.tangent_due or walk.solver is not self._reference
+            if of_tangent:  # one that is not positive has no factor or no answer
+                self._refuse_tangent(walk)
+            elif walk.here is walk.base:
+                raise
+            else:
+                self._go_back(walk)
             return None
         walk.escalated = walk.escalated or linear.escalated
         return self._judge(walk, linear.result)
@@ -291,17 +291,21 @@ class NonlinearSolver:
         return system.algebra.combine([(1.0 - share, tangent), (share, system.K), (1.0, brace)])
 
     def _refuse_tangent(self, walk: Walk) -> None:
-        """Go on from the last place that was no extrapolation, with a tangent of more care.
+        """Go on with a tangent of more care.
 
         Where there is none the reference makes all further passes.
         """
-        walk.here = walk.base
         walk.care += 1
-        walk.tangent_due = not walk.refused
         if walk.refused:
             walk.solver = self._reference
             walk.A = self.A
+        self._go_back(walk)
+
+    def _go_back(self, walk: Walk) -> None:
+        """Go on from the last place that was no extrapolation, by a tangent if there may be one."""
+        walk.here = walk.base
         walk.acceleration = self._make_acceleration()
+        walk.tangent_due = not walk.refused
 
     def _pose_about(self, walk: Walk) -> StepProblem:
         """Return the linear step about where the walk is."""
@@ -391,9 +395,7 @@ class NonlinearSolver:
         """
         if walk.here is walk.base:
             walk.base = self._shorten(walk, there)
-        walk.here = walk.base
-        walk.acceleration = self._make_acceleration()
-        walk.tangent_due = not walk.refused
+        self._go_back(walk)
 
     def _shorten(self, walk: Walk, there: Pass) -> Place:
         """Return how far to go towards the end of a pass. Collective.
@@ -410,67 +412,29 @@ class NonlinearSolver:
         way = end.d - start.d
         first = self._find_slope(there, start.rest, way)
         last = self._find_slope(there, end.rest, way)
-        if not walk.outside and isfinite(last):
-            walk.outside = True
-            return end
-        if walk.outside and not first < 0.0:
-            # A tangent that is not positive leads up. Passes of the reference do not, but with
-            # friction, which has no energy.
-            if walk.solver is self._reference and isfinite(last):
-                return end
-            self._refuse_tangent(walk)
-            return start
-        if last <= FLAT * abs(first):
-            return end
 
-        return self._find_flat(walk, there, first, last)
-
-    def _find_flat(self, walk: Walk, there: Pass, first: float, last: float) -> Place:
-        """Return a place on the way of a pass where the slope is small. Collective.
-
-        It lies between a part of the way with a negative slope and one with a positive slope or
-        none: by the secant and by halves in turn. Where none is found so, it is the last place with
-        a negative slope.
-
-        Args:
-            walk: which is at the start of the pass.
-            there: its end.
-            first: slope at the start, negative where the start is outside of the obstacle.
-            last: slope at the end.
-
-        Raises:
-            StepFailure: there is no such place.
-        """
-        start = walk.here
-        way = there.place.d - start.d
-        low = 0.0
-        low_slope = first
-        high = 1.0
-        high_slope = last
-        lowest: Place | None = None
-        for turn in range(PARTS):
-            share = 0.5
-            if turn % 2 == 0 and isfinite(high_slope):
-                share = low_slope / (low_slope - high_slope)
-                share = min(max(share, INSIDE), 1.0 - INSIDE)
-            part = low + share * (high - low)
+        def ask(part: float) -> tuple[Place, float]:
+            """Return the place after a part of the way, and the slope there."""
             d = start.d + part * way
-            place = Place(d, find_rest(self._system, walk.stage, d), there.place.active)
-            slope = self._find_slope(there, place.rest, way)
-            if abs(slope) <= FLAT * abs(first) or (not walk.outside and isfinite(slope)):
-                return place
-            if slope < 0.0:
-                low = part
-                low_slope = slope
-                lowest = place
-            else:
-                high = part
-                high_slope = slope
-        if lowest is None:
+            place = Place(d, find_rest(self._system, walk.stage, d), end.active)
+            return place, self._find_slope(there, place.rest, way)
+
+        # Out of a moved obstacle the whole way is gone, and so is one that still leads down.
+        if not walk.outside:
+            walk.outside = isfinite(last)
+            place = end if walk.outside else find_finite(ask)
+        elif first < 0.0:
+            place = end if last <= FLAT * abs(first) else find_flat(ask, first, last)
+        elif walk.solver is self._reference and isfinite(last):
+            place = end  # friction has no energy, and passes of the reference are trusted
+        else:
+            self._refuse_tangent(walk)  # it is not positive, as it leads up
+            place = start
+        if place is None:
             raise StepFailure(
                 f"{_name(walk)}: no part of a linear step leads to less energy: {self._advice}"
             )
-        return lowest
+        return place
 
     def _find_slope(self, there: Pass, rest: Array, way: Array) -> float:
         """Return the slope of the potential along a way, -(rest - B_tᵀ scale r_t)·way. Collective.
