@@ -53,7 +53,9 @@ def figures() -> ModuleType:
 @pytest.mark.promise("theory/ledger.md", "at the end its defect is 25 % of the initial energy")
 @pytest.mark.parametrize("name", ["inequality", "certificate", "ledger", "condensation"])
 @pytest.mark.promise("theory/ledger.md", "At the end 31.1 % of it")
-@pytest.mark.promise("theory/certificate.md", "A reaction that is wrong by the relative size")
+@pytest.mark.promise(
+    "theory/certificate.md", "In the figure a reaction that is wrong by the relative size"
+)
 def test_pages_state_what_their_figures_show(
     figures: ModuleType, name: str, tmp_path: Path
 ) -> None:
