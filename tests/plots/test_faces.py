@@ -260,6 +260,17 @@ def test_deformed_bodies(runs: Any, figures: list[Any], tmp_path: Path) -> None:
     assert axis._box_aspect / axis._box_aspect[0] == pytest.approx((high - low) / (high - low)[0])
 
 
+def test_edges_of_fine_meshes_in_space(
+    runs: Any, figures: list[Any], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A mesh that counts as fine is drawn, and each of its edges has the colour of its polygon."""
+    monkeypatch.setattr(bodies, "FINE", 1)
+    plot_deformed(runs["hexahedra"], tmp_path / "fine.png", times=[0.021], title="Blocks")
+    (drawn,) = figures[0].axes[0].collections
+    assert np.array_equal(drawn._edgecolor3d, drawn._facecolor3d)
+    assert (tmp_path / "fine.png").stat().st_size > 0
+
+
 def test_points_that_pull() -> None:
     """Held points may pull: then zero is in the middle of the colours, else at their end, where it
     alone is white."""

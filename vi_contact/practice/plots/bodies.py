@@ -289,7 +289,9 @@ class Scene:
         if flat:
             edges = "0.45"
         if states or np.sqrt(np.count_nonzero(self.seen)) > FINE:
-            edges = "face"  # a fine mesh shows nothing but its edges
+            # A fine mesh would show nothing but its edges. The colours are said in full, as
+            # Matplotlib 3.6 does not know the word "face" for polygons in space.
+            edges = colours
         add_polygons(axis, polygons, facecolors=colours, edgecolors=edges, linewidths=EDGE)
         if flat:
             look = {"facecolors": "none", "edgecolors": "0.1", "linewidths": OUTLINE, "zorder": 3}
