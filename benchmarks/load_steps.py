@@ -48,7 +48,6 @@ from petsc4py import PETSc  # noqa: E402
 from vi_contact import StepFailure, vi  # noqa: E402
 from vi_contact.fem import compat  # noqa: E402
 
-logging.getLogger("vi_contact").setLevel(logging.ERROR)  # answers that are no minima
 COMM = MPI.COMM_WORLD
 DOWN = 0.8  # what the top moves in all
 HEIGHT = 2.0
@@ -266,6 +265,8 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument("--json", type=Path, help="file for the rows")
     given = parser.parse_args(arguments)
+    # answers that are no minima are looked for
+    logging.getLogger("vi_contact").setLevel(logging.ERROR)
     rows = []
     # the forms are compiled here
     vi.solve((first := block(COMM, 2)).F, first.u, lower=first.floor, bcs=[first.bc])

@@ -15,6 +15,7 @@ import gc
 import importlib.machinery
 import importlib.util
 import itertools
+import logging
 import os
 import re
 import shutil
@@ -377,6 +378,15 @@ def shared_tmp(comm: Any) -> Iterator[Path]:
     yield Path(path)
     if comm.rank == 0:
         shutil.rmtree(path, ignore_errors=True)
+
+
+@pytest.fixture(autouse=True)
+def _log_level() -> Iterator[None]:
+    """Programs silence the warnings of the package: the next test hears them again."""
+    logger = logging.getLogger("vi_contact")
+    before = logger.level
+    yield
+    logger.setLevel(before)
 
 
 @pytest.fixture(autouse=True)

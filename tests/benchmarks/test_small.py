@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import contextlib
 import io
-import logging
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -145,15 +144,6 @@ SMALL: Mapping[str, tuple[str, str, Mapping[str, Any]]] = {
         {},
     ),
 }
-
-
-@pytest.fixture(autouse=True)
-def loud() -> Iterator[None]:
-    """Some benchmarks silence the warnings of the package."""
-    logger = logging.getLogger("vi_contact")
-    before = logger.level
-    yield
-    logger.setLevel(before)
 
 
 @pytest.mark.parametrize("name", SMALL)

@@ -4,8 +4,6 @@
 from __future__ import annotations
 
 import json
-import logging
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -168,18 +166,9 @@ def test_a_failure_gives_the_first_guess_back(comm: Any) -> None:
         assert np.all(u.x.array == 0.25)
 
 
-@pytest.fixture
-def loud() -> Iterator[None]:
-    """The benchmark silences the warnings of the package."""
-    logger = logging.getLogger("vi_contact")
-    before = logger.level
-    yield
-    logger.setLevel(before)
-
-
 @pytest.mark.slow
 @pytest.mark.serial
-def test_beside_snes(comm: Any, tmp_path: Path, loud: None) -> None:
+def test_beside_snes(comm: Any, tmp_path: Path) -> None:
     """vi.solve takes all steps that SNES takes, to the same u, with no more Newton steps than SNES
     has factors."""
     benchmark = loaded(ROOT / "benchmarks" / "load_steps.py")

@@ -217,6 +217,8 @@ def assemble(
     algebra = algebra_for(space.comm.mpi, space.dimension, space.unknowns, symmetric=body.symmetric)
     absorbers = [DashpotMatrix(space, body, boundary) for boundary in conditions.dashpots]
     acting: list[Any] = [absorber.dashpots.loads(absorber, body) for absorber in absorbers]
+    # refused before matrices are assembled
+    companions = _gather_companions(body, conditions.prescribed, acting)
     load = assemble_loads(space, section, conditions.loads)
     u0 = _evaluate_initial(space, "initial displacement", initial_displacement)
     v0 = _evaluate_initial(space, "initial velocity", initial_velocity)
@@ -224,7 +226,6 @@ def assemble(
     # the equations of the free unknowns, with the loads of prescribed motions and of boundaries
     reduced = _reduce(body, absorbers, algebra, base_inertia=base_inertia)
     M = reduced.M
-    K = reduced.K
     base_mass = None
     if reduced.momenta is not None:
         base_mass = reduced.momenta - np.column_stack([M @ r for r in rigid.T])
@@ -233,7 +234,7 @@ def assemble(
         algebra=algebra,
         M=M,
         C=reduced.C,
-        K=K,
+        K=reduced.K,
         load=replace(
             load,
             inertial=reduced.inertial,
@@ -249,11 +250,11 @@ def assemble(
         u0=u0,
         v0=v0,
         space=space,
-        floating=floats(Unheld(algebra, M, K, rigid, space.bodies, space.coordinates)),
+        floating=floats(Unheld(algebra, M, reduced.K, rigid, space.bodies, space.coordinates)),
         tied=space.tied_unknowns,
         absolute=any(boundary.lets_waves_in for boundary in conditions.dashpots),
         notes=describe_boundaries(conditions.dashpots, comm.rank, notes),
-        companions=_gather_companions(body, conditions.prescribed, acting),
+        companions=companions,
         statics_only=body.statics_only,
         internal=body.internal,
     )
