@@ -16,6 +16,7 @@ from .choices import Sheet
 from .convergence import LIMIT, NOT_TESTED, TESTS, Change, compare
 from .deciding import NEARLY, DecidingNumber, Measure, choose_numbers
 from .rigid_base import explain_edge_pressures
+from .signs import explain_signs
 
 LONGEST = 300  # letters of a text of the title block
 UNKNOWN = "-"
@@ -105,6 +106,7 @@ def describe_first_page(
         *_explain_convergence(deciding, changes, refined, cost),
         *_explain_brief_peaks(deciding, changes),
         *explain_edge_pressures(deciding, run.history, model or {}, numbers),
+        *explain_signs(deciding, run.columns, run.history),
     ]
     return Section("Numbers that decide", tables=[table], notes=notes, pictures=sketches)
 
