@@ -31,6 +31,7 @@ SLICE = 8  # rows of SELL that are stored to the length of the longest
 WIDTHS = (2, 3)  # unknowns of a node for which there are blocks
 SAMPLE = 200  # nodes at which blocks are counted
 WORTH = 0.9  # of AIJ's bytes: with more of them a copy does not pay
+ROUND_OFF = 1e-12  # of the sizes of a row's entries: sums of 1e3 terms in another order stay below
 
 
 @dataclass(frozen=True)
@@ -112,10 +113,42 @@ def copy_for_products(mat: Any, comm: Comm) -> Any:
     own = rows_of(mat)
     chosen = choose_format(count_entries(own, comm))
     if chosen == "sell" and has_sell():
-        return _make_sell(own, mat)
-    if chosen.startswith("baij"):
-        return _make_blocks(own, mat, int(chosen[-1]))
+        copy = _make_sell(own, mat)
+    elif chosen.startswith("baij"):
+        copy = _make_blocks(own, mat, int(chosen[-1]))
+    else:
+        return mat
+
+    # PETSc 3.22 multiplies SELL of several ranks wrongly: no copy is used that was not compared.
+    if multiplies_alike(copy, mat, own, comm):
+        return copy
+    copy.destroy()
     return mat
+
+
+def multiplies_alike(copy: Any, mat: Any, rows: sp.csr_matrix, comm: Comm) -> bool:
+    """Say whether the product of a copy with one vector without zeros is that of its matrix.
+
+    Every row may differ by ``ROUND_OFF`` of the sum of its entries' sizes. Collective.
+
+    Args:
+        copy: a PETSc matrix.
+        mat: the matrix that it was made of.
+        rows: its owned rows.
+        comm: its ranks.
+    """
+    x, of_mat = mat.createVecs()
+    of_copy = of_mat.duplicate()
+    x.setArray(1.0 + 0.5 * np.cos(np.arange(*mat.getOwnershipRangeColumn())))
+    mat.mult(x, of_mat)
+    copy.mult(x, of_copy)
+    sizes = np.asarray(abs(rows).sum(axis=1)).ravel()
+    difference = np.abs(of_copy.array - of_mat.array)
+    # not a number is not alike either
+    unlike = not np.all(difference <= ROUND_OFF * sizes)
+    for vector in (x, of_mat, of_copy):
+        vector.destroy()
+    return not largest(comm, unlike)
 
 
 @cache

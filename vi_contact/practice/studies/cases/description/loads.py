@@ -158,8 +158,9 @@ def _turn(point: Array, force: Array) -> list[float]:
     """Return the moment about the origin of a force at a point: one number in the plane."""
     if len(force) == 1:
         return []
-    moment = np.cross(point, force)
-    return [float(part) for part in np.atleast_1d(moment)]
+    if len(force) == 2:
+        return [float(point[0] * force[1] - point[1] * force[0])]
+    return [float(part) for part in np.cross(point, force)]
 
 
 def _describe_load(given: Any, load: Any, problem: ContactProblem, t_end: float) -> dict[str, Any]:
