@@ -19,8 +19,9 @@ from vi_contact.core.errors import InputError
 from vi_contact.fem.output.load_resultants import find_point
 from vi_contact.practice.cli.entry import main
 from vi_contact.practice.ground_motion import EC8Spectrum, TabulatedSpectrum
+from vi_contact.practice.sheet.choices import Sheet
 from vi_contact.practice.studies import read_case
-from vi_contact.practice.studies.cases.description.design_spectra import read_design_spectrum
+from vi_contact.practice.studies.cases.description.design_spectra import make_sheet_words
 from vi_contact.practice.studies.cases.description.model import describe
 from vi_contact.practice.studies.cases.description.motions import (
     describe_design_spectrum,
@@ -29,6 +30,8 @@ from vi_contact.practice.studies.cases.description.motions import (
 from vi_contact.practice.studies.cases.description.pen import Pen
 from vi_contact.practice.studies.cases.description.surroundings import describe_sides
 from vi_contact.practice.studies.cases.description.tables import input_tables, print_tables
+from vi_contact.practice.studies.cases.parsing import read_arguments
+from vi_contact.practice.studies.cases.table_calls import Spot, make_callee
 from vi_contact.practice.studies.report import WRITERS, report
 from vi_contact.practice.units.report_units import ReportUnits
 
@@ -303,6 +306,17 @@ def test_damping_by_mass_and_drift_on_a_compliant_base(shared_tmp: Path) -> None
     assert not any("compliant base" in one for one in described(shared_tmp)["warnings"])
 
 
+def read_design_spectrum(table: Any, source: str) -> Any:
+    """What a report reads at the key design_spectrum of [sheet]."""
+    words = make_sheet_words(Path())
+    given = {"design_spectrum": table}
+    return (
+        read_arguments(given, make_callee(Sheet), Spot(source, "", "sheet"), words)
+        .build({})
+        .design_spectrum
+    )
+
+
 @pytest.mark.serial
 def test_design_spectra_of_a_case() -> None:
     table = {"type": "EC8", "ground": "B", "ag": 1.6}
@@ -325,7 +339,7 @@ def test_design_spectra_of_a_case() -> None:
 @pytest.mark.parametrize(
     ("table", "said"),
     [
-        ("EC8", "is no table"),
+        ("EC8", "give a table with type = one of EC8, Tabulated"),
         ({"type": "EC9", "ag": 1.0}, "unknown type"),
         ({"type": "EC8", "ag": 1.0, "ground": "F"}, "give A, B, C, D or E"),
         ({"type": "EC8", "ground": "B"}, "lacks the key 'ag'"),
@@ -338,6 +352,20 @@ def test_wrong_design_spectra_are_refused(table: Any, said: str) -> None:
     with pytest.raises(InputError, match=said) as refused:
         read_design_spectrum(table, "case.toml")
     assert "[sheet" in str(refused.value)
+
+
+@pytest.mark.serial
+def test_a_case_names_its_design_spectrum(shared_tmp: Path) -> None:
+    """Both kinds, in the file; an example of docs/guide/check.md. It was refused as unknown key."""
+    code = "sheet.design_spectrum={type='EC8', ground='B', ag='0.16 g'}"
+    told = described(shared_tmp, code)["design_spectrum"]
+    plateau = 2.5 * 0.16 * G * 1.2
+    assert told["accelerations"][told["periods"].index(0.3)] == pytest.approx(plateau)
+    points = "sheet.design_spectrum={periods=[0.0, 5.0], accelerations=[2.0, 2.0], name='site'}"
+    model = described(shared_tmp, points)
+    assert model["design_spectrum"]["name"] == "site"
+    rows = rows_of(model)
+    assert any("site: 2 m/s², of which it has" in remark for _, _, remark in rows.values())
 
 
 def test_a_record_stands_beside_a_design_spectrum(shared_tmp: Path) -> None:

@@ -8,8 +8,9 @@ from difflib import get_close_matches
 from ...core.arguments import check_fields
 from ...core.checks import quote
 from ...core.errors import InputError
+from ..ground_motion.design_spectrum import DesignSpectrum
 from ..units.report_units import ReportUnits
-from .rules import RULES
+from .rules import WORDS
 
 
 @dataclass(frozen=True)
@@ -24,8 +25,9 @@ class Sheet:
         date: of the calculation, a text or a date.
         revision: of the calculation.
         checker: who checks it.
-        numbers: columns of history.csv, and words of ``RULES``; None: those of the rules.
+        numbers: columns of history.csv, and words of ``WORDS``; None: those of the rules.
         units: of the report.
+        design_spectrum: of a code, which stands beside those of the records; None: there is none.
     """
 
     project: str = ""
@@ -35,7 +37,7 @@ class Sheet:
     checker: str = ""
     numbers: Sequence[str] | None = None
     units: ReportUnits = ReportUnits()
-    # The design spectrum, which stands beside that of the motion, takes its place here.
+    design_spectrum: DesignSpectrum | None = None
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -56,19 +58,18 @@ def refuse_unknown_numbers(sheet: Sheet, columns: Collection[str]) -> None:
         sheet: of the case.
         columns: that the run writes into history.csv.
     """
-    rules = {rule.word: rule for rule in RULES}
     for name in sheet.numbers or ():
         if name in columns:
             continue
-        if name not in rules:
-            near = get_close_matches(name, [*columns, *rules], n=3, cutoff=0.5)
+        if name not in WORDS:
+            near = get_close_matches(name, [*columns, *WORDS], n=3, cutoff=0.5)
             question = f"did you mean {' or '.join(near)}? " if near else ""
             raise InputError(
                 f"numbers names {quote(name)}, which is neither a column of the run nor a rule: "
-                f"{question}The rules are {', '.join(rules)}"
+                f"{question}The rules are {', '.join(WORDS)}"
             )
-        if not rules[name].find(columns):
+        if not WORDS[name].find(columns):
             raise InputError(
                 f"numbers names '{name}', and the run records nothing of the kind: add a "
-                f"[[record]] of type {rules[name].recorder}, or leave it out"
+                f"[[record]] of type {WORDS[name].recorder}, or leave it out"
             )

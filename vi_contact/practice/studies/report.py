@@ -31,6 +31,7 @@ from ..plots.web_page import MISSING, can_write, write_web_page
 from ..sheet.choices import Sheet, refuse_unknown_numbers
 from ..sheet.first_page import describe_first_page, list_title_block
 from ..units.report_units import ReportUnits, write_number
+from .cases.description.design_spectra import make_sheet_words
 from .cases.description.tables import input_tables
 from .cases.library import COPY, compute_checksum, read_copy, read_settings
 from .cases.parsing import Words, read, read_arguments
@@ -152,7 +153,7 @@ def _read_sheet(folder: Path, case: Mapping[str, Any], run: RunFolder) -> Sheet:
     table = case.get("sheet", {})
     if not isinstance(table, dict):
         raise spot.make_error("is not a table: write its keys below it")
-    words = Words(folder, {}, default={}, groups=(), short={})
+    words = make_sheet_words(folder)
     sheet: Sheet = read_arguments(table, make_callee(Sheet), spot, words).build({})
     numbers = [name for name, values in run.history.items() if values.ndim == 1]
     try:

@@ -55,10 +55,12 @@ from ....solvers.volume.route import Method
 from ... import engineering, ground_motion, soil
 from ...engineering import checks
 from ...engineering.checks.comparison import Check
+from ...ground_motion.design_spectrum import DesignSpectrum
 from ...ground_motion.record import LARGEST_PEAK, Record
 from ...soil import SoilCurves, UpgoingVelocity
 from . import bodies
 from .bodies import BeamBody, LayerLaw, ParticleBody
+from .description import design_spectra
 from .expressions import Expression, Places
 from .own_classes import describe_defect, is_protocol
 from .parsing import Words
@@ -427,6 +429,7 @@ _FUNCTIONS: Mapping[Any, Mapping[str, Callable[[], Any]]] = {
     ContactSurface: {"contact_surface": lambda: surface, "contact_pair": lambda: pair},
     ImpactLaw: {"Elastic": lambda: laws.Elastic},
     Record: {"read_record": lambda: record, "synthetic": lambda: ground_motion.synthetic},
+    DesignSpectrum: design_spectra.CHOICES,
     Excitation: {"FirstModeHarmonic": lambda: first_mode_harmonic},
     Schedule: {"FirstModePeriod": lambda: first_mode_period},
     Heterogeneous: {"Heterogeneous": lambda: heterogeneous},
@@ -588,6 +591,7 @@ def make_words(folder: Path, allowed: Sequence[str] = ()) -> Words:
         Dashpots: "Dashpots",
         FieldWriter: "XDMF",
         LayerLaw: "contact_layer",
+        DesignSpectrum: design_spectra.DEFAULT,
     }
     return Words(
         folder, _gather_choices(), default, (Facets, Cells), short={Record: "path"}, allowed=allowed

@@ -1,4 +1,4 @@
-"""Read the design spectrum of a case, which stands in its table [sheet].
+"""Say the words of a design spectrum, which a case names in its table [sheet].
 
 [sheet]
 design_spectrum = {type = "EC8", ground = "B", ag = "0.16 g"}
@@ -6,6 +6,7 @@ design_spectrum = {type = "EC8", vertical = true, ag = 1.57}
 design_spectrum = {periods = [0.0, 0.1, 0.4, 2.0], accelerations = [1.0, 2.5, 2.5, 0.5]}
 """
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,10 +14,8 @@ from .....core.errors import InputError
 from .....core.quantities import RATIO, Positive, Unit
 from ....ground_motion.design_spectrum import DesignSpectrum, TabulatedSpectrum
 from ....ground_motion.ec8 import EC8Spectrum
-from ..parsing import Words, read
-from ..table_calls import Spot, build, make_callee
-
-KEY = "design_spectrum"
+from ..parsing import Words
+from ..table_calls import make_callee
 
 
 def eurocode(
@@ -46,41 +45,17 @@ def eurocode(
     return EC8Spectrum.vertical(ag=ag, kind=kind, damping=damping)
 
 
-def read_design_spectrum(value: Any, source: str) -> DesignSpectrum:
-    """Return the design spectrum of a table.
+# Words of a design spectrum -> what they call, when asked; DEFAULT is that of a table without type.
+CHOICES: Mapping[str, Callable[[], Any]] = {
+    "EC8": lambda: eurocode,
+    "Tabulated": lambda: TabulatedSpectrum,
+}
+DEFAULT = "Tabulated"
 
-    Args:
-        value: what stands at the key ``design_spectrum`` of [sheet].
-        source: what sentences begin with, such as the path of the case.
 
-    Raises:
-        InputError: for another type, keys that are unknown or missing, and wrong values.
-    """
-    choices = {
-        "EC8": make_callee(eurocode, name="EC8"),
-        "Tabulated": make_callee(TabulatedSpectrum, name="Tabulated"),
-    }
-    words = Words(
-        folder=Path(),
-        choices={DesignSpectrum: choices},
-        default={DesignSpectrum: "Tabulated"},
-        groups=(),
-        short={},
+def make_sheet_words(folder: Path) -> Words:
+    """Return the words of [sheet] alone: a report asks for no others, and so for no DOLFINx."""
+    choices = {word: make_callee(load(), name=word) for word, load in CHOICES.items()}
+    return Words(
+        folder, {DesignSpectrum: choices}, default={DesignSpectrum: DEFAULT}, groups=(), short={}
     )
-    spot = Spot(source, "sheet", KEY)
-    if not isinstance(value, dict):
-        raise spot.make_error('is no table: give {type = "EC8", …} or {periods = […], …}')
-    spectrum: DesignSpectrum = build(read(value, DesignSpectrum, spot, words), {})
-    return spectrum
-
-
-def find_design_spectrum(case: Any) -> DesignSpectrum | None:
-    """Return the design spectrum of a ``Case``; None where its [sheet] has none.
-
-    Raises:
-        InputError: as of ``read_design_spectrum``.
-    """
-    sheet = case.tables.get("sheet", {})
-    if not isinstance(sheet, dict) or KEY not in sheet:
-        return None
-    return read_design_spectrum(sheet[KEY], str(case.path))

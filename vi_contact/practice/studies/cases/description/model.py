@@ -20,7 +20,6 @@ from ..unread_choices import find_left_over
 from ..vocabulary import Parts
 from .bodies import describe_meshed_body, describe_waves, select_keys
 from .conditions import describe_contact, describe_contact_point, describe_layer
-from .design_spectra import find_design_spectrum
 from .doubts import ROUNDED, find_defects, find_warnings
 from .loads import describe_body_loads, describe_gravity, describe_loads, sum_up
 from .motions import (
@@ -129,7 +128,7 @@ def _describe_actions(
 
 def _describe_motions(case: Any, parts: Parts) -> dict[str, Any]:
     """Return records and other excitations, and the design spectrum of the case."""
-    design = find_design_spectrum(case)
+    design = case.sheet.design_spectrum
     motions = list_motions(case, parts.system)
     return {
         "records": describe_records(motions, design),
