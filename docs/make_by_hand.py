@@ -297,12 +297,17 @@ def run_case(
     return found
 
 
+def read_stored(path: Path) -> list[dict[str, str]]:
+    """Return the rows of a table of stored results; none before its runs."""
+    if not path.exists():
+        return []
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
 def read_found() -> dict[tuple[str, str], float]:
     """Return the stored numbers by case and symbol; none before the first run."""
-    if not FOUND.exists():
-        return {}
-    with FOUND.open(encoding="utf-8", newline="") as file:
-        return {(row["case"], row["symbol"]): float(row["found"]) for row in csv.DictReader(file)}
+    return {(row["case"], row["symbol"]): float(row["found"]) for row in read_stored(FOUND)}
 
 
 def write_found(found: Mapping[tuple[str, str], float]) -> None:
@@ -389,10 +394,9 @@ def find_unexplained(
 
 def steps_section() -> Iterator[str]:
     """Yield the section on the wall at four time steps; nothing before these runs."""
-    if not STEPS.exists():
+    stored = read_stored(STEPS)
+    if not stored:
         return
-    with STEPS.open(encoding="utf-8", newline="") as file:
-        stored = list(csv.DictReader(file))
     yield STEPS_HEAD
     columns = list(dict.fromkeys(row["dt"] for row in stored))
     rows: dict[str, list[str]] = {}
@@ -408,10 +412,9 @@ def steps_section() -> Iterator[str]:
 
 def sheets_table() -> Iterator[str]:
     """Yield what page 1 of the report says at each time step; nothing before these runs."""
-    if not SHEETS.exists():
+    stored = read_stored(SHEETS)
+    if not stored:
         return
-    with SHEETS.open(encoding="utf-8", newline="") as file:
-        stored = list(csv.DictReader(file))
     yield SHEETS_HEAD
     columns = list(dict.fromkeys(row["dt"] for row in stored))
     rows: dict[str, list[str]] = {}

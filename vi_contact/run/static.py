@@ -26,7 +26,7 @@ from ..core.checks import describe_point, number, quote, real
 from ..core.collective import Parts, agree, together
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
-from ..core.stage import Affine, Stage, complete
+from ..core.stage import Affine, Answer, Stage, complete
 from ..core.state_checks import check_problem_given, check_sizes, initial_state
 from ..core.step import Solver, State, StepProblem, StepResult
 from ..solvers.automatic import Automatic
@@ -219,17 +219,7 @@ class Equilibria:
             )
             refuse_nan(step, lambda: problem.static_load)
             result, certificate = self._solve(step)
-        rest = np.zeros_like(old.u)
-        return State(
-            t,
-            old.k,
-            result.x,
-            rest,
-            result.r_n,
-            result.active,
-            r_t=result.r_t,
-            certificate=certificate.worst,
-        )
+        return _stand_still(old, t, result, certificate)
 
     def _solve_nonlinear(self, old: State, t: float) -> State:
         """Return the equilibrium of a body that is not linear at a time.
@@ -250,17 +240,30 @@ class Equilibria:
             )
         step, certified = self.curved.solve(stage)
         answer = complete(stage, step, certified.result)
-        rest = np.zeros_like(old.u)
-        return State(
-            t,
-            old.k,
-            answer.x,
-            rest,
-            answer.r_n,
-            answer.active,
-            r_t=answer.r_t,
-            certificate=certified.certificate.worst,
-        )
+        return _stand_still(old, t, answer, certified.certificate)
+
+
+def _stand_still(
+    old: State, t: float, answer: Answer | StepResult, certificate: Certificate
+) -> State:
+    """Return the state of an equilibrium, which has no velocity.
+
+    Args:
+        old: the state before.
+        t: the time [s].
+        answer: displacements, reactions and the contact set.
+        certificate: of the equilibrium.
+    """
+    return State(
+        t,
+        old.k,
+        answer.x,
+        np.zeros_like(old.u),
+        answer.r_n,
+        answer.active,
+        r_t=answer.r_t,
+        certificate=certificate.worst,
+    )
 
 
 def quasi_static(

@@ -9,7 +9,7 @@ from ...core.algebra import Array
 from ...core.errors import InputError
 from ...run.files.reading import RunFolder
 from ..engineering.peak_values import column_of
-from .rules import WORDS, History, Measure, Rule, find_columns, list_rules
+from .rules import WORDS, History, Measure, Rule, find_columns, find_part, list_rules
 
 FORCES = {"N": "normal force", "T": "shear", "M": "moment about the centre"}  # of parts
 WHOLE = {
@@ -136,7 +136,7 @@ def _name_column(name: str, meaning: str, history: History) -> str:
             if axis[0] == "M"
             else (f"force of support {support} along {axis}")
         )
-    if kind not in FORCES or f"uplift_{part}" not in history:
+    if kind not in FORCES or not find_part(name, history):
         return _shorten_meaning(meaning)
     is_upright = np.isfinite(history.get(f"level_{part}", np.nan)).any()
     word = "thrust" if kind == "N" and is_upright else FORCES[kind]

@@ -83,9 +83,18 @@ def _list_level(names: Names, *, kind: str) -> list[str]:
     return _list_columns(names, prefixes=prefixes)
 
 
+def find_part(column: str, names: Names) -> str:
+    """Return the part of the contact that a column <kind>_<part> is of; "" if it is of none.
+
+    Parts open, and sections do not: a part has a column of its open share.
+    """
+    part = column.partition("_")[2]
+    return part if f"uplift_{part}" in names else ""
+
+
 def _list_thrusts(names: Names) -> list[str]:
-    """Return the normal forces of parts of the contact: they open too, and sections do not."""
-    return [name for name in names if name.startswith("N_") and f"uplift_{name[2:]}" in names]
+    """Return the normal forces of parts of the contact."""
+    return [name for name in names if name.startswith("N_") and find_part(name, names)]
 
 
 def _list_shears(names: Names) -> list[str]:

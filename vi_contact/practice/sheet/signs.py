@@ -6,11 +6,11 @@ support, T = F·t̄ and the sliding have t̄ = (-n̄_y, n̄_x) in the plane, whi
 anticlockwise by a right angle. On level ground n̄ points down and t̄ to the right.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from ...core.step import Columns
 from .deciding import DecidingNumber
-from .rules import History
+from .rules import History, find_part
 
 ALONG = ("T", "sliding")  # of parts in the plane; in space they are sizes
 
@@ -34,7 +34,7 @@ def explain_signs(
             f"for {' and '.join(along)}"
         )
     notes = [f"Positive means: {'; '.join(told)}. Forces are those on the body."] if told else []
-    if any(name.startswith("M_") and _part_of(name, history) for name in names):
+    if any(_is_moment_of_part(name, history) for name in names):
         notes.append(
             "The centre of a moment is the middle of the part at the level of its lowest point, "
             "unless centre of its [[record]] is another point."
@@ -50,19 +50,13 @@ def _find_sign(meaning: str) -> str:
     return clauses[0].removesuffix(" positive").removeprefix("positive with ")
 
 
-def _is_along_contact(name: str, history: Mapping[str, object]) -> bool:
+def _is_along_contact(name: str, history: History) -> bool:
     """Say whether a column is T or the sliding of a part in the plane."""
-    part = _part_of(name, history)
+    part = find_part(name, history)
     return name.partition("_")[0] in ALONG and f"theta_{part}" in history
 
 
-def _part_of(name: str, history: Mapping[str, object]) -> str:
-    """Return the part of the contact that a column belongs to; "" if it is none of a part.
-
-    In space components have an axis before the part, as M_x_base.
-    """
-    rest = name.partition("_")[2]
-    for part in (rest, rest.partition("_")[2]):
-        if part and f"uplift_{part}" in history:
-            return part
-    return ""
+def _is_moment_of_part(name: str, history: History) -> bool:
+    """Say whether a column is a moment of a part; in space it has an axis too, as M_x_base."""
+    kind, _, rest = name.partition("_")
+    return kind == "M" and bool(find_part(name, history) or find_part(rest, history))
