@@ -205,6 +205,7 @@ def pose(
         force -= system.C @ stage.v.at_guess
     if stage.scale != 1.0:
         force *= stage.scale
+        internal = stage.scale * internal
 
     # Conditions on d are those on x, seen from the guess.
     slip0 = stage.slip0
