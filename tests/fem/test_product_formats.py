@@ -243,4 +243,5 @@ def test_products_of_finite_elements():
                 size = PetscMatrix(aij_of(abs(rows_of(matrix.mat)), COMM)) @ abs(x)
                 assert within(matrix @ x, plain @ x, size), name
                 used.add(matrix.product_format)
-    assert {"sell", "baij"} <= used
+    # Which copy of several ranks is right depends on PETSc, and only right ones are used.
+    assert ({"sell", "baij"} if COMM.size == 1 else {"baij"}) <= used
