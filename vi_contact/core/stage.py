@@ -79,8 +79,8 @@ class Stage:
         weight: of this balance in the mean equation of the step.
         before: makes the balance at the beginning of the step, which has the weight 1 - ``weight``;
             None where this balance is the mean one but for its weight.
-        old: (share, u0) where the displacement of the stage is a sum share u0 + x over both ends,
-            at each of which the internal force of a body that is not linear is taken.
+        old: (share u0, share p(u0)) where the displacement of the stage is a sum share u0 + x over
+            both ends, at each of which the internal force p of a body that is not linear is taken.
         of_momentum: whether the mean acceleration of the step is (v1 - v0)/dt.
     """
 
@@ -99,7 +99,7 @@ class Stage:
     carried: Array | None = None
     weight: float = 1.0
     before: Callable[[], Balance] | None = None
-    old: tuple[float, Array] | None = None
+    old: tuple[Array, Array] | None = None
     of_momentum: bool = True
 
     def find_internal(self, system: SemiDiscreteSystem, d: Array | None = None) -> Array:
@@ -110,13 +110,19 @@ class Stage:
 
         Args:
             system: the equations that are marched.
-            d: the increment (n,).
+            d: the increment (n,); None for zero.
+        """
+        internal = system.internal_force(self.find_place(d))
+        return internal if self.old is None else self.old[1] + internal
+
+    def find_place(self, d: Array | None = None) -> Array:
+        """Return the displacement (n,) [m] at which the internal force is asked for.
+
+        Args:
+            d: the increment (n,); None for zero.
         """
         u: Any = self.u.at_guess if d is None else self.u(d)
-        if self.old is None or system.internal is None:
-            return system.internal_force(u)
-        share, u0 = self.old
-        return share * system.internal_force(u0) + system.internal_force(u - share * u0)
+        return u if self.old is None else u - self.old[0]
 
 
 @dataclass(frozen=True)
@@ -156,7 +162,7 @@ def make_matrix(
     )
 
 
-def find_rest(system: SemiDiscreteSystem, stage: Stage, d: Array | None = None) -> Array:
+def find_rest(system: SemiDiscreteSystem, stage: Stage, d: Array) -> Array:
     """Return what is left of the forces at an increment: b of the step from there, (n,).
 
     scale (f - carried - M a - C v - p(u)), with p(u) = K u for a linear body.
@@ -164,15 +170,13 @@ def find_rest(system: SemiDiscreteSystem, stage: Stage, d: Array | None = None) 
     Args:
         system: the equations that are marched.
         stage: the balance.
-        d: the increment (n,); None for zero.
+        d: the increment (n,).
     """
     force = stage.load.copy() if stage.carried is None else stage.load - stage.carried
     for matrix, rate in ((system.M, stage.a), (system.C, stage.v)):
         if matrix is None or rate.is_zero:
             continue
-        x = rate.at_guess if d is None else rate(d)
-        if x is not None:  # accelerations are often zero at the guess, by its choice
-            force -= matrix @ x
+        force -= matrix @ rate(d)
     force -= stage.find_internal(system, d)
     return force if stage.scale == 1.0 else stage.scale * force
 

@@ -129,6 +129,10 @@ def position_stage(
         from B_t u0 and what the obstacle slides, and slip rates are slips over dt.
     """
     end = state.t + dt
+    of_start = None
+    if old is not None and problem.equations.internal is not None:
+        share, u0 = old
+        of_start = (share * u0, share * problem.equations.internal_force(u0))
     return Stage(
         guess=guess,
         u=u,
@@ -145,7 +149,7 @@ def position_stage(
         carried=carried,
         weight=weight,
         before=before,
-        old=old,
+        old=of_start,
         of_momentum=of_momentum,
     )
 

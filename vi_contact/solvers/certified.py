@@ -79,7 +79,7 @@ class CertifiedSolver:
         for solver in solvers:
             solver.check(problem)
         self._problem = problem
-        self._A = A
+        self.A = A
         self._scale = scale
         self._solvers = solvers
         self._tolerance = tolerance
@@ -98,7 +98,7 @@ class CertifiedSolver:
         """Return the solver at a place in the list of methods, prepared when first needed."""
         if place not in self._prepared:
             prepare = report_time("preparing")(self._solvers[place].prepare)
-            self._prepared[place] = prepare(self._A, self._surface, self._scale)
+            self._prepared[place] = prepare(self.A, self._surface, self._scale)
         return self._prepared[place]
 
     def solve(self, step: StepProblem) -> Certified:

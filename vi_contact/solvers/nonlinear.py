@@ -102,7 +102,6 @@ class Walk:
         base: the last place that no extrapolation has made.
         outside: whether ``base`` is outside of the obstacle, as the end of every pass is.
         solver: of the passes.
-        A: their matrix.
         acceleration: what the passes with this matrix have shown.
         best: the pass with the smallest residual, None before the first one.
         rate: its residual over the one before; 1 where nothing is known of it.
@@ -116,7 +115,6 @@ class Walk:
     here: Place
     base: Place
     solver: CertifiedSolver
-    A: EffectiveMatrix
     acceleration: Anderson
     outside: bool = False
     best: Pass | None = None
@@ -215,7 +213,7 @@ class NonlinearSolver:
         """
         whole = pose(self._problem, stage, self.A, self._system)
         start = Place(whole.guess, whole.b, whole.active)
-        walk = Walk(stage, whole, start, start, self._reference, self.A, self._make_acceleration())
+        walk = Walk(stage, whole, start, start, self._reference, self._make_acceleration())
         if whole.internal is not None and not self._is_finite(whole.internal):
             raise StepFailure(
                 f"{_name(walk)} begins where its internal force is NaN or infinite: {self._advice}"
@@ -259,17 +257,12 @@ class NonlinearSolver:
         stage = walk.stage
         internal = self._system.internal
         assert internal is not None  # linear bodies have no walk
-        u = stage.u(walk.here.d)
-        if stage.old is not None:
-            share, u0 = stage.old
-            u = u - share * u0
         self.tangents += 1
         walk.solver = self._reference  # the tangent before gives its memory back
-        tangent = internal.tangent(u)
+        tangent = internal.tangent(stage.find_place(walk.here.d))
         if walk.care:
             tangent = self._brace(tangent, walk.here.active, SHARES[walk.care])
-        walk.A = make_matrix(self._system, stage, tangent)
-        walk.solver = self._prepare(stage, walk.A)
+        walk.solver = self._prepare(stage, make_matrix(self._system, stage, tangent))
         walk.acceleration = self._make_acceleration()
         walk.tangent_due = False
 
@@ -298,7 +291,6 @@ class NonlinearSolver:
         walk.care += 1
         if walk.refused:
             walk.solver = self._reference
-            walk.A = self.A
         self._go_back(walk)
 
     def _go_back(self, walk: Walk) -> None:
@@ -317,7 +309,7 @@ class NonlinearSolver:
             slip0 = slip0 - surface.tangential_values(here.d)
         return replace(
             whole,
-            A=walk.A,
+            A=walk.solver.A,
             b=here.rest,
             bound=whole.bound - surface.normal_values(here.d),
             slip0=slip0,

@@ -285,13 +285,13 @@ class Scene:
         if not flat:
             # Sides along the light are darker, or the shape of a body could not be seen.
             colours[:, :3] *= 0.6 + 0.4 * np.abs(compute_normals(polygons) @ LIGHT)[:, None]
-        edges: Any = [BODIES[body % len(BODIES)] for body in self.body[shown]]
-        if flat:
-            edges = "0.45"
+        edges: Any = "0.45"
         if states or np.sqrt(np.count_nonzero(self.seen)) > FINE:
             # A fine mesh would show nothing but its edges. The colours are said in full, as
             # Matplotlib 3.6 does not know the word "face" for polygons in space.
             edges = colours
+        elif not flat:
+            edges = [BODIES[body % len(BODIES)] for body in self.body[shown]]
         add_polygons(axis, polygons, facecolors=colours, edgecolors=edges, linewidths=EDGE)
         if flat:
             look = {"facecolors": "none", "edgecolors": "0.1", "linewidths": OUTLINE, "zorder": 3}

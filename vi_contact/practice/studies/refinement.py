@@ -72,6 +72,12 @@ def refine(
 def _read_finished(folder: str | Path) -> RunFolder:
     """Return the run of a folder; InputError for one that cannot be refined."""
     run = read_run(folder)
+    _refuse_unfinished(run, folder)
+    return run
+
+
+def _refuse_unfinished(run: RunFolder, folder: str | Path) -> None:
+    """Raise InputError for the run of a folder that cannot be refined."""
     if not is_own(run.folder / COPY):
         raise InputError(
             f"'{folder}' holds no {COPY}, the case that is to be refined: give the folder of a "
@@ -81,7 +87,6 @@ def _read_finished(folder: str | Path) -> RunFolder:
         raise InputError(
             f"the run in '{folder}' has not finished: continue it with --restart, then refine it"
         )
-    return run
 
 
 def estimate_cost(folder: str | Path, names: Sequence[str]) -> str:
@@ -97,7 +102,20 @@ def estimate_cost(folder: str | Path, names: Sequence[str]) -> str:
     Raises:
         InputError: as of ``refine``.
     """
-    run = _read_finished(folder)
+    return tell_cost(read_run(folder), names)
+
+
+def tell_cost(run: RunFolder, names: Sequence[str]) -> str:
+    """Say what ``estimate_cost`` does of a run that has finished.
+
+    Args:
+        run: what ``read_run`` returned.
+        names: what is halved, as of ``refine``.
+
+    Raises:
+        InputError: as of ``refine``.
+    """
+    _refuse_unfinished(run, run.folder)
     seconds = _read_seconds(run)
     phrases = []
     for name in names:
@@ -244,12 +262,16 @@ def _read_status(folder: Path) -> str:
     return str(read_run(folder).facts.get("status")) if is_own(folder / HISTORY_CSV) else ""
 
 
-def _find_refined(run: RunFolder, name: str) -> Path | None:
-    """Return the folder of a refined run of the same case that has finished; None without."""
+def _find_refined(run: RunFolder, name: str) -> RunFolder | None:
+    """Return a refined run of the same case that has finished; None without."""
     if not is_own(run.folder / COPY):
         return None
     out = inner_folder(run.folder, FOLDER, name)
-    return out if _read_status(out) == "finished" and _is_of_same_case(run, name) else None
+    if not is_own(out / HISTORY_CSV):
+        return None
+    refined = read_run(out)
+    is_whole = refined.facts.get("status") == "finished" and _is_of_same_case(run, name)
+    return refined if is_whole else None
 
 
 def read_refined(run: RunFolder, failed: Mapping[str, str]) -> dict[str, RunFolder]:
@@ -265,14 +287,17 @@ def read_refined(run: RunFolder, failed: Mapping[str, str]) -> dict[str, RunFold
     for name in NAMES:
         if name in failed:  # its folder may be none
             continue
-        out = _find_refined(run, name)
-        if out is not None:
-            refined[name] = read_run(out)
+        found = _find_refined(run, name)
+        if found is not None:
+            refined[name] = found
     return refined
 
 
 def describe_refinement(
-    run: RunFolder, failed: Mapping[str, str], numbers: ReportNumbers | None = None
+    run: RunFolder,
+    failed: Mapping[str, str],
+    numbers: ReportNumbers | None = None,
+    refined: Mapping[str, RunFolder] | None = None,
 ) -> Section:
     """Return the section with the peaks of a run and of those in its folder ``refined``.
 
@@ -282,11 +307,14 @@ def describe_refinement(
         run: what ``read_run`` returned.
         failed: name -> why, of ``refine``.
         numbers: writes them; None: in the usual units.
+        refined: what ``read_refined`` returned; None: it is read here.
     """
     numbers = numbers or ReportNumbers()
-    refined = {
+    if refined is None:
+        refined = read_refined(run, failed)
+    peaks_of = {
         name: {peak.name: peak for peak in peaks(other.history, other.columns)}
-        for name, other in read_refined(run, failed).items()
+        for name, other in refined.items()
     }
     sentences = [f"The run with {NAMES[name]} failed: {why}." for name, why in failed.items()]
     if not refined:
@@ -298,7 +326,7 @@ def describe_refinement(
     sized = [peak for peak in peaks(run.history, run.columns) if peak.name not in UNSIZED]
     scales = find_scales(run)
     rows = [
-        _compare(peak, refined, numbers)
+        _compare(peak, peaks_of, numbers)
         for peak in sized
         if _measure(peak) > NOISE * scales[peak.unit]
     ]

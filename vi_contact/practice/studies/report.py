@@ -36,7 +36,7 @@ from .cases.description.tables import input_tables
 from .cases.library import COPY, compute_checksum, read_copy, read_settings
 from .cases.parsing import Words, read, read_arguments
 from .cases.table_calls import Spot, build, make_callee
-from .refinement import describe_refinement, estimate_cost, read_refined
+from .refinement import describe_refinement, read_refined, tell_cost
 
 WRITERS = {".html": write_web_page, ".pdf": write_pages}
 
@@ -109,13 +109,14 @@ def write_report(
     picture = pages[0].with_name("model.png")
     model, inputs, sketches = _read_model(folder, picture, sheet.units)
     numbers = ReportNumbers(sheet.units, read_slice(model))
+    refined = read_refined(run, failed)
     first = describe_first_page(
         run,
         sheet,
         numbers,
-        refined=read_refined(run, failed),
+        refined=refined,
         failed=failed,
-        cost=_estimate_cost(run),
+        cost="" if "dt" in refined else _tell_cost(run),
         sketches=sketches,
         model=model,
     )
@@ -125,7 +126,7 @@ def write_report(
     # Before the last two of them, the solver's and the peaks, what is known beside the run.
     pictures = draw_run(run, pages[0].parent, title=heading)
     comparison = _describe_checks(folder, numbers)
-    error = describe_refinement(run, failed, numbers)
+    error = describe_refinement(run, failed, numbers, refined)
     more = [comparison, error, Section("Pictures", pictures=pictures)]
     told[-2:-2] = [section for section in more if not section.is_empty]
 
@@ -163,10 +164,10 @@ def _read_sheet(folder: Path, case: Mapping[str, Any], run: RunFolder) -> Sheet:
     return sheet
 
 
-def _estimate_cost(run: RunFolder) -> str:
+def _tell_cost(run: RunFolder) -> str:
     """Return what half the time step would cost, in words; "" for a run that cannot be refined."""
     try:
-        return estimate_cost(run.folder, ["dt"])
+        return tell_cost(run, ["dt"])
     except InputError:
         return ""
 

@@ -62,7 +62,7 @@ from .bodies import (
     refuse_ranks,
 )
 from .expressions import check_axes
-from .friction_of_tables import join_laws, list_contacts, list_laws
+from .friction_of_tables import join_laws, list_laws
 from .library import check_format, find_base_folder, keep_copy, refuse_case_of_others
 from .old_keys import renew_keys
 from .own_classes import check_packages
@@ -71,7 +71,18 @@ from .sentences import in_words_of_case_files
 from .stage_tables import Stage, split_stages
 from .stages import Reached, run_stages
 from .strain_compatible import CALL, iterate, with_known_damping
-from .table_calls import Call, Callee, Group, Node, Spot, build, make_callee, needs_body, walk_nodes
+from .table_calls import (
+    Call,
+    Callee,
+    Group,
+    Node,
+    Spot,
+    build,
+    list_calls,
+    make_callee,
+    needs_body,
+    walk_nodes,
+)
 from .toml_file import read_toml, with_settings
 from .unread_choices import Part, find_unread, refuse_unread
 from .vocabulary import MeshFile, Parts, make_words, weight
@@ -269,17 +280,21 @@ class Case:
         # before any work; ``simulate`` looks once more, with the folder's lock
         if folder is not None:
             on_root(MpiComm(comm), partial(self.refuse_files_of_others, folder))
+        case = self
         parts = None
         if self.sheet.numbers is not None:
-            parts = self.parts(comm)
+            if self.body is None:  # one mesh for all that follows
+                meshed = self.meshed(comm) if reached is None else reached.meshed
+                case = replace(self, ready=meshed)
+            parts = case.parts(comm)
             self.check_sheet(comm, parts)
         if "strain_compatible" in self.nodes:
             return iterate(
-                self, comm, folder, restart=restart, progress=progress, wall_time=wall_time
+                case, comm, folder, restart=restart, progress=progress, wall_time=wall_time
             )
         if self.stages:
             return run_stages(
-                self,
+                case,
                 comm,
                 folder,
                 restart=restart,
@@ -288,7 +303,7 @@ class Case:
                 changed=changed,
                 wall_time=wall_time,
             )
-        parts = parts or self.parts(comm)
+        parts = parts or case.parts(comm)
         with self.call(parts, folder) as call:
             self.keep_model(comm, parts, folder)
             return simulate(
@@ -453,7 +468,7 @@ class Case:
         Raises:
             InputError: the mu of a table does not go with [friction].
         """
-        return list_laws(self._build_friction(), list_contacts(self.nodes.get("contact", ())))
+        return list_laws(self._build_friction(), list_calls(self.nodes.get("contact", ())))
 
     def _build_body_problem(self, body: Body) -> ContactProblem:
         """Return the problem of a body without a mesh, before its excitations."""
@@ -537,7 +552,7 @@ class Case:
             parts.surface,
             friction=join_laws(
                 self._build_friction(),
-                list_contacts(self.nodes.get("contact", ())),
+                list_calls(self.nodes.get("contact", ())),
                 parts.surface,
             ),
             impact=self._build_table("impact"),
