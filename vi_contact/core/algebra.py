@@ -247,18 +247,6 @@ class EffectiveMatrix:
                 self.__dict__.setdefault("factor", factor)
         return self._last[1]
 
-    def share_factors(self, other: "EffectiveMatrix") -> "EffectiveMatrix":
-        """Return this matrix with the factors of another, whose entries are the same.
-
-        Args:
-            other: a matrix that has been used already; factors that it has not made yet are not
-                shared.
-        """
-        self._last = other._last
-        if other.factorised:
-            self.__dict__["factor"] = other.factor
-        return self
-
     @cached_property
     def factor(self) -> Factor:
         """Return the one factorisation of A."""

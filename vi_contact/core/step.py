@@ -147,6 +147,11 @@ class StepProblem:
                 "one of each"
             )
 
+    @property
+    def start(self) -> Array:
+        """Return the unknowns (n,) that the step starts from, by which sizes are judged."""
+        return self.guess if self.origin is None else self.origin
+
     def friction_at(self, slip: Array) -> FrictionLaw:
         """Return the friction law at the rates of this slip. Collective.
 

@@ -125,7 +125,7 @@ def _measure_sizes(step: StepProblem, result: StepResult, image: Array | None) -
         image=image,
         internal=step.b if step.internal is None else step.internal,
         x=result.x,
-        guess=step.guess if step.origin is None else step.origin,
+        guess=step.start,
         r_n=result.r_n,
     )
     largest = _find_largest(surface.comm, arrays)

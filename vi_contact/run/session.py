@@ -23,7 +23,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..core.algebra import Comm, largest
+from ..core.algebra import Comm, largest, total
 from ..core.checks import on_all
 from ..core.collective import call_user, together
 from ..core.errors import InputError, Interrupted, OutOfTime, StepFailure
@@ -421,9 +421,8 @@ class Session:
         surface = self.method.problem.surface
         gap = surface.gap(state.t) - surface.normal_values(state.u)
         opened = gap[~state.active & np.isfinite(gap)]
-        closed = surface.comm.sum(np.array([np.count_nonzero(state.active)]))
         facts: dict[str, Any] = {
-            "closed_points": int(closed[0]),
+            "closed_points": round(total(surface.comm, np.count_nonzero(state.active))),
             "largest_opening": largest(surface.comm, np.max(opened, initial=0.0)),
         }
         if state.certificate is not None:

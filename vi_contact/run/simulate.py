@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
-from inspect import Parameter, signature
+from inspect import signature
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -158,9 +158,9 @@ def rehearse(**arguments: Any) -> None:
     Raises:
         InputError: whatever ``simulate`` refuses before its first step.
     """
-    parameters = signature(simulate).parameters.values()
-    defaults = {one.name: one.default for one in parameters if one.default is not Parameter.empty}
-    with open_run(RunRequest(**(defaults | arguments))):
+    bound = signature(simulate).bind(**arguments)
+    bound.apply_defaults()
+    with open_run(RunRequest(**bound.arguments)):
         pass  # all that can be refused has been looked at
 
 

@@ -34,7 +34,7 @@ def refuse_nan(step: StepProblem, source: Source | None = None) -> None:
     """
     # Inner products are the quickest look there is. One that overflows is looked into.
     slip0 = step.slip0
-    guess = step.guess if step.origin is None else step.origin
+    guess = step.start
     is_fine = isfinite(step.b.dot(guess))
     is_fine = is_fine and not isnan(step.bound.dot(step.bound))  # infinite gaps never close
     is_fine = is_fine and (slip0 is None or isfinite(np.vdot(slip0, slip0)))
@@ -48,7 +48,7 @@ def _refuse(step: StepProblem, source: Source | None) -> None:
     Where numbers are only large, and their inner product overflowed, there is none.
     """
     surface = step.surface
-    guess = step.guess if step.origin is None else step.origin
+    guess = step.start
     space = step.A.space
     nodes = None if space is None else space.coordinates
     nan_gaps = np.where(np.isnan(step.bound), np.nan, 0.0)

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.algebra import Array, Mask
+from ..core.algebra import Array, Mask, largest
 from ..fem import compat
 from ..fem.matrices.petsc_algebra import PetscMatrix, make_index_set
 from ..fem.mesh.communicators import MpiComm
@@ -42,7 +42,7 @@ class FreeJacobian:
         entries = self.part.mat.getValuesCSR()[2]
         is_same = self._entries is not None and np.array_equal(entries, self._entries)
         self._entries = entries
-        return bool(self._comm.max(np.array([float(not is_same)]))[0])
+        return bool(largest(self._comm, not is_same))
 
     def apply_whole(self, x: Array) -> Array:
         """Return J x of all owned unknowns, the held ones too. Collective."""

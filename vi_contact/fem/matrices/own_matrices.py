@@ -106,8 +106,7 @@ def system_from_arrays(
         return system
     remedy = "give an object with force(u), energy(u) and tangent(u)"
     provides(OWNER, "internal", internal, ("force", "energy", "tangent"), remedy)
-    held = np.asarray(clamped, dtype=np.int64).ravel()
-    rows = np.setdiff1d(np.arange(n), np.where(held < 0, held + n, held))
+    rows = np.setdiff1d(np.arange(n), np.asarray(clamped, dtype=np.int64))
     return system.changed(internal=FreeRows(internal, rows, n))
 
 

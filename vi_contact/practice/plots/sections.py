@@ -22,7 +22,7 @@ from . import charts
 from .charts import Chart
 from .histories import LEDGER
 from .maps import Drawing, list_maps
-from .report_numbers import PLACES, ReportNumbers, read_slice
+from .report_numbers import PLACES, ReportNumbers, is_upright, read_slice
 from .report_words import (
     CHARTS,
     HEADERS,
@@ -167,8 +167,9 @@ def _describe_motion(run: RunFolder) -> Section:
 def _tabulate_results(run: RunFolder, numbers: ReportNumbers) -> Section:
     """Tabulate forces, sliding and the like, and how far each part is from sliding."""
     results: list[list[str]] = []
+    scales = find_scales(run)
     for title, prefixes in RESULTS.items():
-        results += _list_results(run, numbers, title, tuple(prefixes))
+        results += _list_results(run, numbers, scales, title, tuple(prefixes))
     safety = list(_list_safety(run))
     tables = [Table(HEADERS["results"], results), Table(HEADERS["safety"], safety)]
     return Section(
@@ -179,7 +180,11 @@ def _tabulate_results(run: RunFolder, numbers: ReportNumbers) -> Section:
 
 
 def _list_results(
-    run: RunFolder, numbers: ReportNumbers, title: str, prefixes: tuple[str, ...]
+    run: RunFolder,
+    numbers: ReportNumbers,
+    scales: Mapping[str, float],
+    title: str,
+    prefixes: tuple[str, ...],
 ) -> Iterable[list[str]]:
     """Yield the rows of the columns that begin so.
 
@@ -188,11 +193,11 @@ def _list_results(
     Args:
         run: what ``read_run`` returned.
         numbers: writes them.
+        scales: as of ``find_scales``.
         title: what the columns are.
         prefixes: their beginnings.
     """
     t = run.history["t"]
-    scales = find_scales(run)
     for name in run.columns:
         values = run.history.get(name)
         if not name.startswith(prefixes) or values is None:
@@ -204,8 +209,7 @@ def _list_results(
             continue  # such as the height of the thrust on a level part
         kind, _, part = name.partition("_")
 
-        is_upright = np.isfinite(run.history.get(f"level_{part}", np.nan)).any()
-        if kind in FOR_LEVEL_PARTS and is_upright:
+        if kind in FOR_LEVEL_PARTS and is_upright(part, run.history):
             continue
 
         # When the result is largest in size; heights count where they are numbers.

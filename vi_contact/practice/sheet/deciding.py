@@ -9,6 +9,7 @@ from ...core.algebra import Array
 from ...core.errors import InputError
 from ...run.files.reading import RunFolder
 from ..engineering.peak_values import column_of
+from ..plots.report_numbers import is_upright
 from .rules import WORDS, History, Measure, Rule, find_columns, find_part, list_rules
 
 FORCES = {"N": "normal force", "T": "shear", "M": "moment about the centre"}  # of parts
@@ -138,8 +139,7 @@ def _name_column(name: str, meaning: str, history: History) -> str:
         )
     if kind not in FORCES or not find_part(name, history):
         return _shorten_meaning(meaning)
-    is_upright = np.isfinite(history.get(f"level_{part}", np.nan)).any()
-    word = "thrust" if kind == "N" and is_upright else FORCES[kind]
+    word = "thrust" if kind == "N" and is_upright(part, history) else FORCES[kind]
     return f"{word}, part {part}"
 
 

@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 
 from ...core.algebra import Array
+from ..plots.report_numbers import is_upright
 
 History = Mapping[str, Array]  # column -> values (rows,)
 Names = Collection[str]
@@ -258,12 +259,7 @@ def _choose_parts(where: Where, parts: list[str], history: History) -> list[str]
         parts, key=lambda part: float(np.median(np.abs(np.nan_to_num(history[f"N_{part}"]))))
     )
 
-    # A part that stands upright has a height, and so its thrust a level.
-    upright = [
-        part
-        for part in parts
-        if np.isfinite(history.get(f"level_{part}", np.array([np.nan]))).any()
-    ]
+    upright = [part for part in parts if is_upright(part, history)]
     if where is Where.UPRIGHT:
         return [part for part in upright if part != base] or upright
     return [] if where is Where.LEVEL_BASE and base in upright else [base]

@@ -21,6 +21,7 @@ from ..engineering.checks.model_facts import ModelFacts
 from ..engineering.checks.pressure_line import FormulaLine, make_line
 from ..engineering.pressure_profile import LARGEST, PressureProfile, find_profiles
 from .cases.library import read_copy
+from .cases.toml_file import list_tables
 from .report import read_checks
 
 
@@ -130,10 +131,8 @@ def pick_part(folder: Path, run: RunFolder, part: str) -> Mask:
     chosen = _pick_contact(contacts, part, len(points), folder)
     if chosen is not None:
         return chosen
-    records = read_copy(folder).get("record", [])
-    records = records if isinstance(records, list) else [records]
     names = [name for name, _ in contacts]
-    for record in records:
+    for record in list_tables(read_copy(folder).get("record")):
         if record.get("type") != "Resultants" or record.get("name", record.get("part")) != part:
             continue
         of = record.get("part")

@@ -336,14 +336,12 @@ def _check_states(file: Path, number: Any) -> None:
         file: the checkpoint.
         number: of its format.
     """
-    if number == STATES and not isinstance(number, bool):
-        return
     if number == OLD_STATES:
         raise InputError(
             f"the checkpoint '{file}' is of version 0.2, whose schemes kept other things in mind: "
             "start a new run; report and plot still read the old one"
         )
-    check_format(file, number)
+    check_format(file, number, STATES)
 
 
 def _unpack(file: Path) -> tuple[dict[str, Any], Arrays]:

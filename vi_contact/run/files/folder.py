@@ -52,7 +52,7 @@ from ...core.version import __version__
 
 log = logging.getLogger(__name__)
 FIRST = b"t,k,iterations,certificate,escalated"  # how every history.csv begins
-FORMAT = 1  # of run folders and checkpoints
+FORMAT = 1  # of run folders
 
 ABOUT = "format.json"  # the mark by which a folder belongs to runs
 CHECKPOINT = "checkpoint.npz"
@@ -204,11 +204,11 @@ def _is_frame(name: str) -> bool:
     return bool(name == MESH or FRAME.fullmatch(name) or FRAMES.fullmatch(name))
 
 
-def check_format(file: Path, number: Any) -> None:
-    """Raise InputError for a file of a format, by its number, that this version does not know."""
-    if number != FORMAT or isinstance(number, bool):
+def check_format(file: Path, number: Any, known: int = FORMAT) -> None:
+    """Raise InputError for a file whose format has another number than the one that is known."""
+    if number != known or isinstance(number, bool):
         raise InputError(
-            f"'{file}' has format {quote(number)} and this version of vi_contact reads {FORMAT}: "
+            f"'{file}' has format {quote(number)} and this version of vi_contact reads {known}: "
             "read it with the version that wrote it"
         )
 

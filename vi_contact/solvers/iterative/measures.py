@@ -48,7 +48,7 @@ class StepMeasure:
         self._b = max_abs(load)
         if step.internal is not None:
             self._b = max(self._b, max_abs(step.internal))
-        self._guess = max_abs(step.guess if step.origin is None else step.origin)
+        self._guess = max_abs(step.start)
         self._is_increment = step.origin is not None
 
     def __call__(self, contact: ClosedSet, x: Array, residual: Array, load: Array) -> Measures:

@@ -24,6 +24,7 @@ from ....core.problem import ContactProblem
 from ....core.protocols import FrictionLaw
 from ....core.quantities import RATIO, Finite, NotNegative, Positive, Unit
 from .expressions import Expression, check_axes
+from .toml_file import list_tables
 
 History = Callable[[float], float]
 BODY_TABLES = ("beam", "particle")  # each is a body and its contact
@@ -308,15 +309,14 @@ def _refuse_beside_layer(path: Path, tables: Mapping[str, Any]) -> None:
                 f"{path}: [{key}] does not go with [layer], which {reason}: leave one of the two "
                 "out"
             )
-    contact = tables.get("contact", ())
-    for table in contact if isinstance(contact, list) else [contact]:
+    for table in list_tables(tables.get("contact")):
         for key in ("roller", "springs"):
-            if isinstance(table, dict) and table.get(key):
+            if table.get(key):
                 raise InputError(
                     f"{path}: [[contact]] has {key}, and [layer] is a law of rigid obstacles from "
                     "which a body may part: leave one of the two out"
                 )
-        if isinstance(table, dict) and "mu" in table:
+        if "mu" in table:
             raise InputError(
                 f"{path}: [[contact]] has mu, and [layer] is a law without friction: leave one of "
                 "the two out"

@@ -13,13 +13,7 @@ from ....core.algebra import total
 from ....core.protocols import FrictionLaw, Frictionless
 from ....core.surfaces import ContactSurface
 from ....laws.friction import Coulomb
-from .table_calls import Call, Node
-
-
-def list_contacts(node: Node) -> list[Call]:
-    """Return the calls of the tables [[contact]]; none where there is no table."""
-    entries = node if isinstance(node, tuple) else (node,)
-    return [entry for entry in entries if isinstance(entry, Call)]
+from .table_calls import Call
 
 
 def list_laws(whole: FrictionLaw, contacts: Sequence[Call]) -> list[FrictionLaw]:
@@ -65,9 +59,13 @@ def join_laws(whole: FrictionLaw, contacts: Sequence[Call], surface: ContactSurf
     values = [find_mu(law) or 0.0 for law in list_laws(whole, contacts)]
     if len(set(values)) == 1:
         return Coulomb(values[0])
-    parts: Sequence[Any] = surface.parts  # type: ignore[attr-defined]
-    counts = [round(total(surface.comm, len(part.slots))) for part in parts]
-    return Coulomb(np.repeat(values, counts))
+    return Coulomb(np.repeat(values, count_points(surface)))
+
+
+def count_points(surface: ContactSurface) -> list[int]:
+    """Return how many points of a joined surface each table has on all ranks. Collective."""
+    parts: Sequence[Any] = getattr(surface, "parts", ())
+    return [round(total(surface.comm, len(part.slots))) for part in parts]
 
 
 def find_mu(law: FrictionLaw) -> float | None:

@@ -8,6 +8,7 @@ from typing import Any
 
 from ....core.errors import InputError
 from ....core.renamed import KEYS
+from .toml_file import list_tables
 
 log = logging.getLogger(__name__)
 
@@ -27,7 +28,7 @@ def renew_keys(
     """
     renewed = deepcopy(dict(tables))
     found: set[tuple[str, str]] = set()
-    for name, table in _list_tables(renewed):
+    for name, table in _list_renewable(renewed):
         for old, new in KEYS.get(name, {}).items():
             if old not in table:
                 continue
@@ -44,7 +45,7 @@ def renew_keys(
     return renewed, texts
 
 
-def _list_tables(tables: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+def _list_renewable(tables: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the name and the content of all tables that may have old keys, those of stages too."""
     stages = tables.get("stage")
     wholes = [tables, *(stages if isinstance(stages, list) else [])]
@@ -52,10 +53,8 @@ def _list_tables(tables: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any
         if not isinstance(whole, dict):
             continue
         for name in KEYS:
-            value = whole.get(name)
-            for table in value if isinstance(value, list) else [value]:
-                if isinstance(table, dict):
-                    yield name, table
+            for table in list_tables(whole.get(name)):
+                yield name, table
 
 
 def _renew_setting(setting: str, found: set[tuple[str, str]]) -> str:

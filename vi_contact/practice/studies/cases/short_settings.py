@@ -16,7 +16,7 @@ from .parsing import suggest_nearest
 from .quantities import read_quantity
 from .stage_tables import refuse_own
 from .table_calls import Spot
-from .toml_file import format_value, with_settings
+from .toml_file import format_value, list_tables, with_settings
 
 # of a layer shaken sideways
 ROLLERS = [{"facets": side, "components": [1]} for side in ("left_side", "right_side")]
@@ -78,7 +78,7 @@ class ShortOptions:
         if self.motion is None:
             return []
         files = self.motion.split(",")
-        before = _list_tables(tables.get("excitation"))
+        before = list_tables(tables.get("excitation"))
         direction = before[0].get("direction") if before else None
         axes = len(direction) if isinstance(direction, list) else _count_axes(tables)
         if not all(files) or len(files) > 2:
@@ -95,7 +95,7 @@ class ShortOptions:
         settings = [f"excitation={format_value(motions)}"]
 
         # Recorded motions have an inertia load, and a vertical one cannot shake a layer on rollers.
-        system = next(iter(_list_tables(tables.get("system"))), {})
+        system = next(iter(list_tables(tables.get("system"))), {})
         if system.get("base_inertia") is False:
             settings.append("system.base_inertia=true")
         if len(files) == 2 and system.get("prescribed") == ROLLERS:
@@ -145,7 +145,7 @@ class ShortOptions:
             return []
         excitation = tables.get("excitation")
         settings = []
-        for number, table in enumerate(_list_tables(excitation), start=1):
+        for number, table in enumerate(list_tables(excitation), start=1):
             if table.get("type") == "GroundMotion":
                 key = "scale"
                 unit = "1"
@@ -182,7 +182,7 @@ class ShortOptions:
             return []
         other: dict[str, Any] = {"type": "Condensed"}
         if solver.get("type") == "Condensed":
-            escalation = _list_tables(tables.get("escalation"))
+            escalation = list_tables(tables.get("escalation"))
             routes = [table for table in escalation if table.get("type") == "Volume"]
             other = routes[0] if routes else REFERENCE
         both = {"type": "CrossChecked", "primary": solver, "others": [other]}
@@ -211,14 +211,8 @@ def _put_record(old: dict[str, Any], path: str, axis: int, axes: int) -> dict[st
 
 def _count_axes(tables: Mapping[str, Any]) -> int:
     """Return the dimension of a body, as far as its tables tell: one of a rod and a particle."""
-    body = next(iter(_list_tables(tables.get(find_body_table(tables)))), {})
+    body = next(iter(list_tables(tables.get(find_body_table(tables)))), {})
     return 1 if "particle" in tables or body.get("type") == "rod_problem" else 2
-
-
-def _list_tables(value: Any) -> list[dict[str, Any]]:
-    """Return a table, or the tables of a list."""
-    values = value if isinstance(value, list) else [value]
-    return [table for table in values if isinstance(table, dict)]
 
 
 def _name_method(kind: str, name: str, methods: Mapping[str, Sequence[str]]) -> str:

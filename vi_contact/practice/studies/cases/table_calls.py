@@ -233,6 +233,12 @@ def build(node: Node, context: Context) -> Any:
     return node
 
 
+def list_calls(node: Node) -> list[Call]:
+    """Return the calls that a table, or an array of tables, makes itself; those in them not."""
+    entries = node if isinstance(node, tuple) else (node,)
+    return [entry for entry in entries if isinstance(entry, Call)]
+
+
 def walk_nodes(node: Node) -> Iterator[Node]:
     """Yield the node and all nodes in it."""
     yield node

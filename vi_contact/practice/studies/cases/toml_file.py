@@ -193,3 +193,9 @@ def format_value(value: Any) -> str:
 def _quote(text: str) -> str:
     """Return a basic string of TOML."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def list_tables(value: Any) -> list[dict[str, Any]]:
+    """Return a table, or the tables of a list."""
+    values = value if isinstance(value, list) else [value]
+    return [table for table in values if isinstance(table, dict)]

@@ -18,7 +18,7 @@ from typing import Any
 from ....core.errors import InputError
 from .bodies import BODY_TABLES
 from .stage_tables import OF_MOTION, WHOLE
-from .table_calls import Call, Node, walk_nodes
+from .table_calls import Call, Node, list_calls, walk_nodes
 
 RATIO_LAW = "DampingRatio"
 BLIND_TO_RATIOS = (
@@ -61,9 +61,7 @@ class Part:
 
     def list_calls(self, table: str) -> list[Call]:
         """Return the calls that a table, or an array of tables, makes itself; those in them not."""
-        node = self.nodes.get(table, ())
-        entries = node if isinstance(node, tuple) else (node,)
-        return [entry for entry in entries if isinstance(entry, Call)]
+        return list_calls(self.nodes.get(table, ()))
 
     @property
     def system(self) -> Mapping[str, Node]:

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from .....core.algebra import Array, largest, total
+from .....core.algebra import Array, largest
 from .....core.problem import ContactProblem
 from .....core.step import AXES
 from .....fem.mesh.tagged_mesh import Facets
 from .....fem.output.outline import facets_with_cells
 from ..bodies import Body
-from ..friction_of_tables import find_mu
+from ..friction_of_tables import count_points, find_mu
 from ..table_calls import Group, walk_nodes
 
 _CAPITAL = re.compile(r"(?<=[a-z])(?=[A-Z])")  # between the words of a name such as CompliantBase
@@ -58,7 +58,7 @@ def describe_contact(
     # The points of the whole surface, on all ranks, are those of one table after the other.
     whole = surface.whole()
     parts = getattr(surface, "parts", ())
-    ends = np.cumsum([0, *(round(total(surface.comm, len(part.slots))) for part in parts)])
+    ends = np.cumsum([0, *count_points(surface)])
     laws = case.list_friction()
     for number, (node, (a, b)) in enumerate(zip(nodes, pairwise(ends), strict=True)):
         groups = [inner.name for inner in walk_nodes(node) if isinstance(inner, Group)]

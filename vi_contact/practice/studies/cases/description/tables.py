@@ -5,6 +5,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
+from ....plots.report_numbers import read_slice
 from ....plots.sections import Table
 from ....units.report_units import ReportUnits
 from .pen import NONE, Model, Pen, Row
@@ -41,9 +42,7 @@ def input_tables(model: Model, units: ReportUnits) -> list[Table]:
     Returns:
         Tables with the columns of HEADER; those without rows are left out.
     """
-    section = model.get("section") or {}
-    in_slice = section.get("type") == "PlaneStrain"
-    pen = Pen(units, section["thickness"] if in_slice else None)
+    pen = Pen(units, read_slice(model))
     tables = []
     for title, list_rows in TABLES.items():
         rows = list(list_rows(model, pen))
