@@ -8,8 +8,8 @@ import numpy as np
 from ...core.algebra import Array
 from ...core.errors import InputError
 from ...run.files.reading import RunFolder
+from ...run.recorders.contact_parts import is_upright
 from ..engineering.peak_values import column_of, find_stretch
-from ..plots.report_numbers import is_upright
 from .rules import WORDS, History, Measure, Rule, find_columns, find_part, list_rules
 
 FORCES = {"N": "normal force", "T": "shear", "M": "moment about the centre"}  # of parts

@@ -378,3 +378,13 @@ def contact_summary(
     active = read("active")[:, :, 0] > 0.5
     gap = read("gap")[:, :, 0]
     return part.derive(part.sum_up(r_n, r_t, active), part.find_largest(gap, slip))
+
+
+def is_upright(part: str, history: Mapping[str, Array]) -> bool:
+    """Say whether a part of the contact stands upright: it has a height, and its thrust a level.
+
+    Args:
+        part: its name in the columns.
+        history: column -> values (rows,) of a run.
+    """
+    return bool(np.isfinite(history.get(f"level_{part}", np.nan)).any())
