@@ -14,10 +14,11 @@ from ...core.errors import InputError
 from ...core.own_files import is_own
 from ...run.files.folder import HISTORY_H5, MODEL
 from ...run.files.reading import RunFolder, read_object, read_run
+from ...run.recorders.contact_parts import find_in_box
 from ..engineering.checks.comparison import find_duration
 from ..engineering.checks.earth_pressure_seismic import LayerCheck
 from ..engineering.checks.earth_pressure_static import EarthPressure
-from ..engineering.checks.model_facts import ModelFacts
+from ..engineering.checks.model_facts import ModelFacts, find_owners
 from ..engineering.checks.pressure_line import FormulaLine, make_line
 from ..engineering.pressure_profile import LARGEST, PressureProfile, find_profiles
 from .cases.library import read_copy
@@ -175,8 +176,7 @@ def _pick_contact(
         folder: of the run.
     """
     names = [name for name, _ in contacts]
-    owners = [name for name in names if part == name]
-    owners = owners or [name for name in names if part in name.split(" on ")]
+    owners = find_owners(names, part)
     if len(owners) != 1:
         return None
     if sum(points for _, points in contacts) != count:
@@ -193,11 +193,7 @@ def _pick_contact(
 def _pick_box(box: Any, points: Array) -> Mask | None:
     """Return the points (m, d) in a box, its faces included; None for what is no box of numbers."""
     try:
-        corners = np.sort(np.asarray(box, dtype=float), axis=0)
+        corners = np.asarray(box, dtype=float)
     except (TypeError, ValueError):
         return None
-    if corners.shape != (2, points.shape[1]):
-        return None
-    slack = 1e-9 * np.ptp(points, axis=0).max()
-    inside = (points >= corners[0] - slack) & (points <= corners[1] + slack)
-    return np.asarray(inside.all(axis=1))
+    return find_in_box(points, corners) if corners.shape == (2, points.shape[1]) else None
