@@ -21,9 +21,10 @@ from ..engineering.checks.earth_pressure_static import EarthPressure
 from ..engineering.checks.model_facts import ModelFacts, find_owners
 from ..engineering.checks.pressure_line import FormulaLine, make_line
 from ..engineering.pressure_profile import LARGEST, PressureProfile, find_profiles
+from ..units.report_units import ReportUnits
 from .cases.library import read_copy
 from .cases.toml_file import list_tables
-from .report import read_checks
+from .report import read_checks, read_sheet
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,7 @@ class ProfileReport:
         width: of the model across its plane [m], by which forces are divided; None in space where
             no check gives it: forces are then those of the whole.
         notes: sentences about the run.
+        units: of the report of the run.
     """
 
     part: str
@@ -44,6 +46,7 @@ class ProfileReport:
     lines: tuple[FormulaLine, ...]
     width: float | None
     notes: tuple[str, ...]
+    units: ReportUnits = ReportUnits()
 
 
 @check_arguments
@@ -97,7 +100,9 @@ def profile(
         for check in checks
         if not isinstance(check, LayerCheck)
     ]
-    return ProfileReport(part, profiles, tuple(lines), width, _find_notes(run, part, profiles))
+    notes = _find_notes(run, part, profiles)
+    units = read_sheet(folder, read_copy(folder), run).units
+    return ProfileReport(part, profiles, tuple(lines), width, notes, units)
 
 
 def _find_notes(run: RunFolder, part: str, profiles: Sequence[PressureProfile]) -> tuple[str, ...]:
