@@ -44,7 +44,7 @@ from .protocols import FrictionLaw, Frictionless, MassLaw
 from .surfaces import ContactSurface
 
 if TYPE_CHECKING:
-    from .stage import Answer, Stage
+    from .stage import Answer, NonlinearForces, Stage
 
 
 @dataclass(frozen=True)
@@ -115,6 +115,8 @@ class StepProblem:
         origin: the unknowns (n,) that x is an increment of (``core.stage``); None where x is all.
         internal: ``scale`` times K u (n,) at x = 0, a part of b beside which rounding is judged;
             None where it is not known.
+        forces: of a body that is not linear, whose step is rest(x) = Bᵀr with ``forces.find_rest``
+            in the place of b - A x, and A that of the reference stiffness; None of a linear one.
 
     Of several runs at once (``by_rows`` of ``Scheme``), b, guess and active have a row for each,
     (k, n) and (k, m); what the runs share is as above.
@@ -135,6 +137,7 @@ class StepProblem:
     lower: Array | None = None
     origin: Array | None = None
     internal: Array | None = None
+    forces: "NonlinearForces | None" = None
 
     def __post_init__(self) -> None:
         rows = self.guess.shape[-1]
