@@ -11,7 +11,7 @@ from ..core.algebra import Array, Mask
 from ..core.arguments import check_arguments
 from ..core.certificate import Certificate
 from ..core.quantities import Positive, Remedy
-from ..core.step import StepProblem, StepResult
+from ..core.step import StepProblem
 from ..solvers.certified import TOLERANCE, CertifiedSolver
 from ..solvers.condensed import Condensed
 from ..solvers.normal.lemke import Lemke
@@ -155,9 +155,12 @@ def run_steps(
     x = np.zeros(int(contact.free.sum()))
     active = surface.gap(0.0) <= 0.0
     loads = np.zeros_like(contact.v_free)
-    steps: list[StepProblem] = []
-    results: list[StepResult] = []
-    certificates: list[Certificate] = []
+    times = []
+    answers: list[Certified] = []
+    gap = []
+    slip = []
+    r_t = []
+    nothing = np.zeros((surface.count, 1))  # without friction nothing rubs or is said to slide
     for k in range(len(loads)):
         step = contact.step(k, loads, x, active)
         certified = answer(step)
@@ -165,28 +168,19 @@ def run_steps(
         loads[k] = contact.load(result.r_n, result.r_t)
         x = result.x
         active = result.active
-        steps.append(step)
-        results.append(result)
-        certificates.append(certified.certificate)
-
-    # Histories of all conditions; without friction nothing rubs and nothing is said to slide.
-    gap = []
-    slip = []
-    r_t = []
-    nothing = np.zeros((surface.count, 1))
-    for step, result in zip(steps, results, strict=True):
-        gap.append(step.bound - surface.normal_values(result.x))
-        if step.slip0 is None:
-            slip.append(nothing)
-        else:
-            slip.append(surface.tangential_values(result.x) - step.slip0)
+        times.append(step.t)
+        answers.append(certified)
+        gap.append(step.bound - surface.normal_values(x))
+        origin = step.slip0
+        slip.append(nothing if origin is None else surface.tangential_values(x) - origin)
         r_t.append(nothing if result.r_t is None else result.r_t)
+    results = [certified.result for certified in answers]
     if iterations is None:
         iterations = np.array([result.iterations for result in results])
     forces = contact.cartesian(loads)
     return ContactRun(
         contact=contact,
-        times=np.array([step.t for step in steps]),
+        times=np.array(times),
         r_n=np.array([result.r_n for result in results]),
         r_t=np.array(r_t)[:, :, 0],
         gap=np.array(gap),
@@ -194,7 +188,7 @@ def run_steps(
         displacement=contact.compliance.displacement(forces),
         forces=forces,
         active=np.array([result.active for result in results]),
-        certificates=tuple(certificates),
+        certificates=tuple(certified.certificate for certified in answers),
         iterations=iterations,
         history=history,
     )

@@ -177,8 +177,7 @@ class NonlinearSolver:
         best = passes.best
         if best is not None and is_certified:
             log.debug("%s: %d linear steps, %s", _name(step), passes.count, best.certificate)
-            result = replace(best.result, iterations=passes.count)
-            return Certified(result, best.certificate, walk.escalated)
+            return replace(best, result=replace(best.result, iterations=passes.count))
         reached = "" if best is None else f" ({best.certificate})"
         if walk.care:
             reached += "; its tangent is not positive there, as that of a body that gives way"
