@@ -44,7 +44,7 @@ from .protocols import FrictionLaw, Frictionless, MassLaw
 from .surfaces import ContactSurface
 
 if TYPE_CHECKING:
-    from .stage import Answer, NonlinearForces, Stage
+    from .stage import Answer, Stage
 
 
 @dataclass(frozen=True)
@@ -87,6 +87,13 @@ class State:
     def with_velocity(self, v: Array) -> "State":
         """Return the state with another velocity."""
         return State(self.t, self.k, self.u, v, self.r_n, self.active, self.memory, self.r_t)
+
+
+class StepForces(Protocol):
+    """Know the forces of a step whose body is not linear (``core.stage.NonlinearForces``)."""
+
+    def find_rest(self, d: Array) -> Array:
+        """Return what is left of them at x = d (n,), in the unit of b: b - A d if linear."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +144,7 @@ class StepProblem:
     lower: Array | None = None
     origin: Array | None = None
     internal: Array | None = None
-    forces: "NonlinearForces | None" = None
+    forces: StepForces | None = None
 
     def __post_init__(self) -> None:
         rows = self.guess.shape[-1]

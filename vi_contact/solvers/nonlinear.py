@@ -192,13 +192,14 @@ class NonlinearSolver:
         Raises:
             StepFailure: the internal force is no number there, as that of a body inside out.
         """
-        assert step.forces is not None and step.internal is not None  # linear bodies have no walk
-        if not self._is_finite(step.internal):
+        forces = step.forces
+        assert isinstance(forces, NonlinearForces)  # linear bodies have no walk
+        if step.internal is not None and not self._is_finite(step.internal):
             raise StepFailure(
                 f"{_name(step)} begins where its internal force is NaN or infinite: {self._advice}"
             )
         start = Place(step.guess, step.b, step.active)
-        return Walk(step, step.forces, start, start, self._reference, self._make_acceleration())
+        return Walk(step, forces, start, start, self._reference, self._make_acceleration())
 
     def _go(self, walk: Walk, passes: Passes[Pass]) -> Iterator[Pass]:
         """Yield passes, each from where the ones before point to. Collective.
