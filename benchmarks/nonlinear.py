@@ -115,7 +115,7 @@ def measure_march(problem: vc.ContactProblem, dt: float, steps: int) -> Numbers:
     return {
         "linear_steps_mean": float(np.mean(passes)),
         "linear_steps_max": max(passes),
-        "tangents_per_step": stepper.passes[dt].tangents / steps,
+        "tangents_per_step": stepper.prepared[dt].tangents / steps,
         "certificate": max(report.certificate.worst for report in reports),
         "energy_defect": max(defects) / max(energies),
         "loss_algorithmic": max(losses) / max(energies),
@@ -201,7 +201,7 @@ def measure_barrel(n: int, count: int) -> Numbers:
     owned = V.dofmap.index_map.size_local
     theirs = posed.u.x.array[: 2 * owned].reshape(-1, 2) + [0.0, times[-1]]
     theirs = sort_by_place(V.tabulate_dof_coordinates()[:owned, :2], theirs)
-    curved = equilibria.curved
+    curved = equilibria.solver
     assert curved is not None  # the body is not linear
     return {
         "unknowns": space.unknowns,

@@ -25,6 +25,7 @@ from vi_contact.bem.contact import BoundaryContact, Conditions, conditions_on
 from vi_contact.bem.contact_run import ContactRun, march_contact
 from vi_contact.bem.uzawa_space_time import SpaceTimeUzawa
 from vi_contact.core.errors import InputError, StepFailure
+from vi_contact.solvers.friction.slip_rate import RateIteration
 
 pytestmark = pytest.mark.serial
 MATERIAL = vc.LinearElastic.from_wave_speeds(1.0, 0.5, 1.0)
@@ -182,6 +183,27 @@ def test_uzawa_fails_in_words():
     with pytest.raises(InputError, match="slip rate"):
         SpaceTimeUzawa().solve(rates)
     assert away(march_contact(rates), run("weak Coulomb")) < 1e-10  # the march takes them
+
+
+def test_the_law_is_certified_at_the_rates_of_the_answer():
+    """Friction that falls with the slip rate: in every step the limit is that of its own rates. A
+    march that took the law at rest would be refused."""
+    law = vc.SlipRateCoulomb(vc.ExponentialDecay(mu_s=0.5, mu_k=0.05, v_c=0.02))
+    contact = BoundaryContact(condensed(), friction=law)
+    found = march_contact(contact)
+    rate = np.abs(found.slip) / condensed().dt
+    limit = (0.05 + 0.45 * np.exp(-rate / 0.02)) * found.r_n
+    force = np.abs(found.r_t).max()
+    slides = rate > 1e-6 * rate.max()
+    assert np.abs(np.abs(found.r_t) - limit)[slides].max() <= 1e-9 * force
+    assert found.worst <= 1e-9 and slides.any()
+
+    class Blind(RateIteration):
+        def solve(self, step, rest, mu, solve_given, slip_of):
+            return solve_given(mu, None)
+
+    with pytest.raises(StepFailure, match="stayed above the certificate tolerance"):
+        march_contact(contact, solver=vc.Condensed(rates=Blind()))
 
 
 def test_limits_of_the_friction_laws():

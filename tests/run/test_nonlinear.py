@@ -84,7 +84,7 @@ def test_passes_and_tangents_are_few() -> None:
     stepper = Stepper(make_chain(), scheme=vc.Midpoint(), solver=vc.Condensed())
     for _ in range(150):
         stepper.accept(stepper.attempt(2e-3))
-    solver = stepper.passes[2e-3]
+    solver = stepper.prepared[2e-3]
     assert sum(solver.counts) / 150 <= 12.0 and solver.tangents / 150 <= 3.0
 
 

@@ -18,6 +18,7 @@ pytest.importorskip("dolfinx")
 
 import ufl
 from dolfinx import fem, mesh
+from fem_problems import max_over_ranks
 from own_forms import clamped, space, square
 from site_pages import ROOT, loaded
 
@@ -87,6 +88,28 @@ def test_the_answers_of_solve_to_the_last_digit(comm: Any, method: Any, power: i
         (active, inner, u), (other_active, other_inner, other) = fields
         assert active == other_active and sum(active) > 0 and inner == other_inner
         assert np.max(np.abs(u - other)) <= 1e-15
+    problem.close()
+
+
+@pytest.mark.parametrize("power", [0, 1], ids=["linear", "soap film"])
+def test_the_certificate_is_of_the_form_at_the_answer(comm: Any, power: int) -> None:
+    """By hand, of F assembled anew: what no bound carries; and of another load it is large."""
+    membrane = Membrane(comm, power=power)
+    problem = vi.Problem(membrane.F, membrane.u, bcs=membrane.bcs)
+    result = problem.solve(lower=-0.3)
+    assert result.certificate.worst <= 1e-9 and result.active[0] > 0
+
+    def left_over() -> float:
+        F = compat.assemble_vector(compat.compile_form(membrane.F))
+        carried = F.array_r - owned(result.lambda_lower)
+        held, _ = compat.bc_values(membrane.bcs[0], len(membrane.u.x.array))
+        carried[[i for i in held if i < len(carried)]] = 0.0
+        largest = max_over_ranks(comm, owned(result.lambda_lower))
+        return float(max_over_ranks(comm, carried) / largest)
+
+    assert left_over() <= 1e-9
+    membrane.load.value *= 1.01
+    assert left_over() > 1e-4
     problem.close()
 
 

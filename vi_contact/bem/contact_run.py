@@ -10,14 +10,12 @@ import numpy as np
 from ..core.algebra import Array, Mask
 from ..core.arguments import check_arguments
 from ..core.certificate import Certificate
-from ..core.errors import StepFailure
 from ..core.quantities import Positive, Remedy
-from ..core.step import StepProblem, StepResult
-from ..core.verify import kkt_residual
-from ..solvers.certified import TOLERANCE
+from ..core.step import StepProblem
+from ..solvers.certified import TOLERANCE, CertifiedSolver
 from ..solvers.condensed import Condensed
-from ..solvers.door import refuse_nan
 from ..solvers.normal.lemke import Lemke
+from ..solvers.passes import Certified
 from .contact import BoundaryContact
 from .poincare_steklov import work
 
@@ -53,21 +51,16 @@ def march_contact(
             f"boundary elements: W[0] {contact.p_matrix.sentence}; other runs may be as right as "
             "this one"
         )
-    prepared = (solver or default).prepare(contact.matrix, contact.surface, 1.0)
-
-    def solve(step: StepProblem) -> StepResult:
-        """Return the answer to a step, or raise StepFailure where its certificate is too large."""
-        result = prepared.solve(step)
-        certificate = kkt_residual(step, result)
-        if not certificate.worst <= tolerance:
-            raise StepFailure(
-                f"boundary element step {step.k} at t = {step.t:.6g} s stayed above the "
-                f"certificate tolerance {tolerance:g} ({certificate}): try Condensed() with "
-                "another method"
-            )
-        return result
-
-    return run_steps(contact, solve)
+    certified = CertifiedSolver(
+        None,
+        contact.matrix,
+        1.0,
+        [solver or default],
+        tolerance,
+        surface=contact.surface,
+        advice="try Condensed() with another method",
+    )
+    return run_steps(contact, certified.solve)
 
 
 @dataclass(frozen=True)
@@ -145,7 +138,7 @@ class ContactRun:
 
 def run_steps(
     contact: BoundaryContact,
-    answer: Callable[[StepProblem], StepResult],
+    answer: Callable[[StepProblem], Certified],
     *,
     iterations: Array | None = None,
     history: tuple[float, ...] = (),
@@ -154,7 +147,7 @@ def run_steps(
 
     Args:
         contact: the condensed body and its support.
-        answer: gives the result of a step.
+        answer: gives the certified answer of a step.
         iterations: of each step or window; None takes those of the results.
         history: what a method for many steps logs.
     """
@@ -162,36 +155,32 @@ def run_steps(
     x = np.zeros(int(contact.free.sum()))
     active = surface.gap(0.0) <= 0.0
     loads = np.zeros_like(contact.v_free)
-    steps: list[StepProblem] = []
-    results: list[StepResult] = []
-    for k in range(len(loads)):
-        step = contact.step(k, loads, x, active)
-        refuse_nan(step)
-        result = answer(step)
-        loads[k] = contact.load(result.r_n, result.r_t)
-        x = result.x
-        active = result.active
-        steps.append(step)
-        results.append(result)
-
-    # Histories of all conditions; without friction nothing rubs and nothing is said to slide.
+    times = []
+    answers: list[Certified] = []
     gap = []
     slip = []
     r_t = []
-    nothing = np.zeros((surface.count, 1))
-    for step, result in zip(steps, results, strict=True):
-        gap.append(step.bound - surface.normal_values(result.x))
-        if step.slip0 is None:
-            slip.append(nothing)
-        else:
-            slip.append(surface.tangential_values(result.x) - step.slip0)
+    nothing = np.zeros((surface.count, 1))  # without friction nothing rubs or is said to slide
+    for k in range(len(loads)):
+        step = contact.step(k, loads, x, active)
+        certified = answer(step)
+        result = certified.result
+        loads[k] = contact.load(result.r_n, result.r_t)
+        x = result.x
+        active = result.active
+        times.append(step.t)
+        answers.append(certified)
+        gap.append(step.bound - surface.normal_values(x))
+        origin = step.slip0
+        slip.append(nothing if origin is None else surface.tangential_values(x) - origin)
         r_t.append(nothing if result.r_t is None else result.r_t)
+    results = [certified.result for certified in answers]
     if iterations is None:
         iterations = np.array([result.iterations for result in results])
     forces = contact.cartesian(loads)
     return ContactRun(
         contact=contact,
-        times=np.array([step.t for step in steps]),
+        times=np.array(times),
         r_n=np.array([result.r_n for result in results]),
         r_t=np.array(r_t)[:, :, 0],
         gap=np.array(gap),
@@ -199,7 +188,7 @@ def run_steps(
         displacement=contact.compliance.displacement(forces),
         forces=forces,
         active=np.array([result.active for result in results]),
-        certificates=tuple(map(kkt_residual, steps, results)),
+        certificates=tuple(certified.certificate for certified in answers),
         iterations=iterations,
         history=history,
     )

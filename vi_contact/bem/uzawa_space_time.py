@@ -30,7 +30,10 @@ from ..core.checks import instance
 from ..core.errors import InputError, StepFailure
 from ..core.quantities import Positive, Unit
 from ..core.step import StepProblem, StepResult, refuse_limits
+from ..core.verify import kkt_residual
 from ..laws.friction import project
+from ..solvers.door import refuse_nan
+from ..solvers.passes import Certified
 from .contact import BoundaryContact
 from .contact_run import ContactRun, run_steps
 from .energetic import sum_products
@@ -213,13 +216,15 @@ class _SpaceTime:
         """
         contact = self.contact
 
-        def answer(step: StepProblem) -> StepResult:
-            """Return the result of a step whose reactions are known."""
+        def answer(step: StepProblem) -> Certified:
+            """Return the answer of a step whose reactions are known."""
+            refuse_nan(step)
             r_n = r[step.k - 1, 0]
             r_t = r[step.k - 1, 1][:, None] if contact.frictional else None
             x = contact.matrix.factor.solve(step.b + contact.load(r_n, r_t))
             active = (r_n > 0.0) | contact.bilateral
-            return StepResult(x, r_n, active, int(counts.sum()), "space-time Uzawa", r_t)
+            result = StepResult(x, r_n, active, int(counts.sum()), "space-time Uzawa", r_t)
+            return Certified(result, kkt_residual(step, result), escalated=False)
 
         return self._certify(run_steps(contact, answer, iterations=counts, history=history))
 

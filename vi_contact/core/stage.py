@@ -52,10 +52,13 @@ class Affine:
         change = self.slope * d
         return change if self.at_guess is None else self.at_guess + change
 
-    @property
-    def is_zero(self) -> bool:
-        """Say whether it is zero for every d, as rates are at rest."""
-        return self.at_guess is None and self.slope == 0.0
+    def find(self, d: Array | None) -> Array | None:
+        """Return its value (n,) where that is not zero for want of any part.
+
+        Args:
+            d: the increment (n,); None for zero.
+        """
+        return self.at_guess if d is None or self.slope == 0.0 else self(d)
 
 
 @dataclass(frozen=True)
@@ -121,7 +124,7 @@ class Stage:
         Args:
             d: the increment (n,); None for zero.
         """
-        u: Any = self.u.at_guess if d is None else self.u(d)
+        u: Any = self.u.find(d)
         return u if self.old is None else u - self.old[0]
 
 
@@ -162,23 +165,64 @@ def make_matrix(
     )
 
 
-def find_rest(system: SemiDiscreteSystem, stage: Stage, d: Array) -> Array:
-    """Return what is left of the forces at an increment: b of the step from there, (n,).
+def find_rest(
+    system: SemiDiscreteSystem, stage: Stage, d: Array | None = None
+) -> tuple[Array, Array]:
+    """Return what is left of the forces at an increment, and the internal force in it.
 
-    scale (f - carried - M a - C v - p(u)), with p(u) = K u for a linear body.
+    scale (f - carried - M a - C v - p(u)) and scale p(u), with p(u) = K u for a linear body. The
+    first one is b of the step from there.
 
     Args:
         system: the equations that are marched.
         stage: the balance.
-        d: the increment (n,).
+        d: the increment (n,); None for zero, where accelerations are often zero too, by the choice
+            of the guess.
+
+    Returns:
+        Both (n,), in the unit of b.
     """
-    force = stage.load.copy() if stage.carried is None else stage.load - stage.carried
-    for matrix, rate in ((system.M, stage.a), (system.C, stage.v)):
-        if matrix is None or rate.is_zero:
-            continue
-        force -= matrix @ rate(d)
-    force -= stage.find_internal(system, d)
-    return force if stage.scale == 1.0 else stage.scale * force
+    internal = stage.find_internal(system, d)
+    force = stage.load - internal
+    if stage.carried is not None:
+        force -= stage.carried
+    a = stage.a.find(d)
+    if a is not None:
+        force -= system.M @ a
+    v = None if system.C is None else stage.v.find(d)
+    if system.C is not None and v is not None:
+        force -= system.C @ v
+    if stage.scale != 1.0:
+        force *= stage.scale
+        internal = stage.scale * internal
+    return force, internal
+
+
+@dataclass(frozen=True)
+class NonlinearForces:
+    """Hold the forces of a step whose body is not linear.
+
+    Attributes:
+        system: the equations of the step.
+        stage: the balance.
+    """
+
+    system: SemiDiscreteSystem
+    stage: Stage
+
+    def find_rest(self, d: Array) -> Array:
+        """Return what is left of the forces at an increment (n,): b - A d of a linear body."""
+        return find_rest(self.system, self.stage, d)[0]
+
+    def find_tangent(self, d: Array) -> Matrix:
+        """Return p'(u) (n, n) [N/m] at an increment (n,)."""
+        internal = self.system.internal
+        assert internal is not None  # linear bodies have no such forces
+        return internal.tangent(self.stage.find_place(d))
+
+    def make_matrix(self, tangent: Matrix) -> EffectiveMatrix:
+        """Return A of the step with a tangent in the place of K."""
+        return make_matrix(self.system, self.stage, tangent)
 
 
 def pose(
@@ -197,19 +241,7 @@ def pose(
     """
     system = problem.equations if system is None else system
     surface = problem.surface
-
-    # Forces at the guess. Accelerations are often zero there, by the choice of the guess.
-    internal = stage.find_internal(system)
-    force = stage.load - internal
-    if stage.carried is not None:
-        force -= stage.carried
-    if stage.a.at_guess is not None:
-        force -= system.M @ stage.a.at_guess
-    if system.C is not None and stage.v.at_guess is not None:
-        force -= system.C @ stage.v.at_guess
-    if stage.scale != 1.0:
-        force *= stage.scale
-        internal = stage.scale * internal
+    force, internal = find_rest(system, stage)
 
     # Conditions on d are those on x, seen from the guess.
     slip0 = stage.slip0
@@ -230,36 +262,53 @@ def pose(
         rate_factor=stage.rate_factor,
         origin=stage.guess,
         internal=internal,
+        forces=None if system.internal is None else NonlinearForces(system, stage),
     )
+
+
+def add_increment(
+    x: Array, bound: Array, slip0: Array | None, step: StepProblem, result: StepResult
+) -> Array:
+    """Return x + d for the answer d of a step that was posed about x.
+
+    Rounding of the sum must not open a closed point or move one that sticks: where d is on its
+    bound, x + d is exactly on its own, and where the slip is zero it stays so.
+
+    Args:
+        x: about which the step was posed (n,).
+        bound: (m,) largest B_n (x + d).
+        slip0: B_t (x + d) (m, d - 1) where the slip is zero; None without friction.
+        step: for d.
+        result: its answer.
+    """
+    surface = step.surface
+    d = result.x
+    x = x + d
+    if result.active.any():
+        on_bound = surface.normal_values(d) == step.bound
+        surface.put_normal(x, bound, on_bound)
+    if slip0 is not None:
+        sticks = surface.tangential_values(d) == step.slip0
+        if sticks.any():
+            surface.put_tangential(x, slip0, sticks)
+    return x
 
 
 def complete(stage: Stage, step: StepProblem, result: StepResult) -> Answer:
     """Return the answer for x, with reactions in newtons.
-
-    Rounding of guess + d must not open a closed point or move one that sticks: where d is on its
-    bound, x is exactly on its own, and where the slip is zero it stays so.
 
     Args:
         stage: the balance.
         step: what ``pose`` made of it.
         result: the answer of a solver, for d.
     """
-    surface = step.surface
-    d = result.x
-    x = stage.guess + d
-    if result.active.any():
-        on_bound = surface.normal_values(d) == step.bound
-        surface.put_normal(x, stage.bound, on_bound)
-    if stage.slip0 is not None:
-        sticks = surface.tangential_values(d) == step.slip0
-        if sticks.any():
-            surface.put_tangential(x, stage.slip0, sticks)
+    x = add_increment(stage.guess, stage.bound, stage.slip0, step, result)
     r_n = result.r_n
     r_t = result.r_t
     if stage.scale != 1.0:
         r_n = r_n / stage.scale
         r_t = None if r_t is None else r_t / stage.scale
-    return Answer(x, d, r_n, r_t, result.active)
+    return Answer(x, result.x, r_n, r_t, result.active)
 
 
 def average(

@@ -89,6 +89,13 @@ class State:
         return State(self.t, self.k, self.u, v, self.r_n, self.active, self.memory, self.r_t)
 
 
+class StepForces(Protocol):
+    """Know the forces of a step whose body is not linear (``core.stage.NonlinearForces``)."""
+
+    def find_rest(self, d: Array) -> Array:
+        """Return what is left of them at x = d (n,), in the unit of b: b - A d if linear."""
+
+
 @dataclass(frozen=True)
 class StepProblem:
     """Pose one step, as every solver sees it.
@@ -115,6 +122,8 @@ class StepProblem:
         origin: the unknowns (n,) that x is an increment of (``core.stage``); None where x is all.
         internal: ``scale`` times K u (n,) at x = 0, a part of b beside which rounding is judged;
             None where it is not known.
+        forces: of a body that is not linear, whose step is rest(x) = Bᵀr with ``forces.find_rest``
+            in the place of b - A x, and A that of the reference stiffness; None of a linear one.
 
     Of several runs at once (``by_rows`` of ``Scheme``), b, guess and active have a row for each,
     (k, n) and (k, m); what the runs share is as above.
@@ -135,6 +144,7 @@ class StepProblem:
     lower: Array | None = None
     origin: Array | None = None
     internal: Array | None = None
+    forces: StepForces | None = None
 
     def __post_init__(self) -> None:
         rows = self.guess.shape[-1]

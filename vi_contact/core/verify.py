@@ -24,21 +24,25 @@ ROUNDING = 1e-5
 FEW = 5_000  # numbers in an array, up to which copies cost less than calls
 
 
-def kkt_residual(step: StepProblem, result: StepResult, image: Array | None = None) -> Certificate:
+def kkt_residual(step: StepProblem, result: StepResult, rest: Array | None = None) -> Certificate:
     """Return how well an answer satisfies the conditions of its step. Collective.
 
     Args:
         step: the problem, A x = b - B_nᵀ r_n - B_tᵀ r_t with 0 <= r_n ⊥ gap >= 0, and a law of
-            friction.
+            friction, which is asked at the slip rates of the answer. Of a body that is not linear
+            its own forces stand in the place of b - A x.
         result: the answer: x (n,), r_n (m,) [N, or N s where x is a velocity], r_t (m, d - 1) or
             None, active (m,).
-        image: A x (n,), when whoever asks has made it of this x; None: it is made here.
+        rest: what is left of the forces at x (n,), b - A x of a linear body, when whoever asks has
+            found it; None: it is found here.
 
     Returns:
         The certificate, whose residuals are pure numbers. What is no number makes a residual
         infinite or NaN, so that it can never pass.
     """
-    (sizes,) = _measure_sizes(step, result, image)
+    if rest is None and step.forces is not None:
+        rest = step.forces.find_rest(result.x)
+    (sizes,) = _measure_sizes(step, result, rest)
     return _make_certificate(step, result, sizes)
 
 
@@ -46,7 +50,6 @@ def kkt_residuals(
     many: StepProblem,
     result: StepResult,
     own: Callable[[int], tuple[StepProblem, StepResult]],
-    image: Array | None = None,
 ) -> list[Certificate]:
     """Return the certificates of several steps of one matrix, on one rank.
 
@@ -54,13 +57,12 @@ def kkt_residuals(
         many: the problems; b, guess (k, n) and active (k, m) have a row for each.
         result: the answers, a row for each.
         own: makes the problem and the answer of one row, whose friction is its own.
-        image: A x (k, n), when it has been made; None: it is made here.
 
     Returns:
         The certificate of each row, equal to that of ``kkt_residual``.
     """
     certificates = []
-    for row, sizes in enumerate(_measure_sizes(many, result, image)):
+    for row, sizes in enumerate(_measure_sizes(many, result)):
         # Without friction the sizes say all; a law of friction is asked for each run by itself.
         step, answer = (many, result) if many.slip0 is None else own(row)
         certificates.append(_make_certificate(step, answer, sizes))
@@ -86,15 +88,22 @@ class _Sizes(NamedTuple):
     r_n: Any
 
 
-def _measure_sizes(step: StepProblem, result: StepResult, image: Array | None) -> list[_Sizes]:
+def _measure_sizes(
+    step: StepProblem, result: StepResult, rest: Array | None = None
+) -> list[_Sizes]:
     """Return the largest sizes of a step over all ranks; of several steps, an entry for each.
 
     The conditions are put in as they stand at the head of ``core.step``. Collective: one reduction.
+
+    Args:
+        step: the problem.
+        result: its answer.
+        rest: what is left of the forces at x (n,), in the place of b - A x.
     """
     surface = step.surface
 
     # Equilibrium: what is left of A x - b when the contact forces are added to it.
-    image = step.A @ result.x if image is None else image
+    image = step.A @ result.x if rest is None else step.b - rest
     reactions = surface.reaction_load(result.r_n, result.x.shape[-1], result.r_t)
     unbalanced = image - step.b + reactions
 

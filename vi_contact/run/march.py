@@ -112,7 +112,6 @@ class March(Stepper):
                 self.prepared = {
                     size: self.prepared[size] for size in sizes if size in self.prepared
                 }
-                self.passes = {size: self.passes[size] for size in sizes if size in self.passes}
 
             # The scheme's memory of earlier steps is for steps of one length.
             self.state = self._convert_state(dt)

@@ -19,6 +19,7 @@ of u0 (the centre of mass of a block free to slide on level ground does not move
 problem all else is unique.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,6 +31,7 @@ from ..core.problem import ContactProblem
 from ..core.step import Solver, StepProblem, StepResult
 from ..core.verify import kkt_residual
 from ..solvers.correction import MARGIN, add, choose_share, keep_reactions, pose_remainder
+from ..solvers.passes import Certified, Passes, certify
 from .rigid_bodies import RigidBodies, make_body_springs
 
 ITERATIONS = 200
@@ -63,47 +65,41 @@ class _Motion:
     active: Mask
 
 
-@dataclass
-class _Progress:
-    """Hold the best answer so far.
+@dataclass(frozen=True)
+class _Pass(Certified):
+    """Hold the answer that a step has led to.
 
     Attributes:
-        tolerance: of the certificate, relative.
-        best: the answer.
-        least: the smallest residual so far.
-        slowest: the smallest size of a step so far.
-        vain: how many answers since the best one were no better.
+        motion: the step.
     """
 
-    tolerance: float
-    best: StepResult | None = None
-    least: float = np.inf
+    motion: _Motion
+
+
+@dataclass(kw_only=True)
+class _Progress(Passes[_Pass]):
+    """Hold the best answer so far, by residual and by size of step.
+
+    A smaller step counts near round-off: the residual of a stiff body is there long before soft
+    motions are. One that is neither is in vain.
+
+    Attributes:
+        slowest: the smallest size of a step so far.
+    """
+
     slowest: float = np.inf
-    vain: int = 0
 
-    @property
-    def certified(self) -> bool:
-        """Say whether the smallest residual is below the tolerance."""
-        return self.least <= self.tolerance
+    def is_better(self, there: _Pass) -> bool:
+        """Say whether an answer has a smaller residual or, near round-off, a smaller step."""
+        is_slower = there.worst <= NEAR * self.tolerance and there.motion.pace < self.slowest
+        return there.worst < self.least or is_slower
 
-    def take(self, result: StepResult, worst: float, pace: float) -> None:
-        """Take an answer if it is better than the best so far.
+    gains = is_better
 
-        It is better with a smaller residual or, near round-off, with the smallest step: the
-        residual of a stiff body is there long before soft motions are.
-
-        Args:
-            result: the answer.
-            worst: its residual.
-            pace: the size of the step that led there.
-        """
-        if worst < self.least or (worst <= NEAR * self.tolerance and pace < self.slowest):
-            self.best = result
-            self.vain = 0
-        else:
-            self.vain += 1
-        self.least = min(worst, self.least)
-        self.slowest = min(pace, self.slowest)
+    def take(self, there: _Pass) -> None:
+        """Take an answer into account."""
+        super().take(there)
+        self.slowest = min(there.motion.pace, self.slowest)
 
 
 class Proximal:
@@ -150,25 +146,30 @@ class Proximal:
         resultant = self._bodies.imbalance(self.step.b, reaction)
         return replace(kkt_residual(self.step, result), resultant=resultant)
 
-    def solve(self, step: StepProblem) -> StepResult:
+    def solve(self, step: StepProblem) -> Certified:
         """Iterate until two answers running are no better.
 
         If the solver fails, this is done once with stronger springs instead.
+
+        Raises:
+            StepFailure: no answer is certified.
         """
         self.step = step
-        progress = _Progress(self._tolerance)
+        progress = _Progress(tolerance=self._tolerance, goal=-np.inf, patience=2)
         answer = StepResult(step.guess, np.zeros(step.surface.count), step.active, 0, "")
         for _ in range(2):
             try:
-                self._iterate(replace(progress.best or answer, iterations=0), progress)
+                certify(progress, self._iterate(answer, progress), ITERATIONS)
                 why = f"the residual stayed at {progress.least:.1e}"
                 break
             except StepFailure as failure:
                 why = str(failure)
-            if progress.certified or self._strength == STIFFER:
+            if progress.is_certified or self._strength == STIFFER:
                 break
             self._stiffen(STIFFER)
-        if progress.best is not None and progress.certified:
+            if progress.best is not None:
+                answer = replace(progress.best.result, iterations=0)
+        if progress.best is not None and progress.is_certified:
             return progress.best
         raise StepFailure(
             f"the static stage of a body held by contact alone was not solved ({why}): start "
@@ -176,8 +177,8 @@ class Proximal:
             "of the body"
         )
 
-    def _iterate(self, answer: StepResult, progress: _Progress) -> None:
-        """Iterate from an answer, until the progress is in vain.
+    def _iterate(self, answer: StepResult, progress: _Progress) -> Iterator[_Pass]:
+        """Yield the answers of steps that begin from this one.
 
         Raises:
             StepFailure: of the solver, or when it has spent too many iterations.
@@ -188,19 +189,18 @@ class Proximal:
         centre = answer.x  # from where d counts
         carried = np.zeros_like(centre)  # resultants that the step before left
         old: _Motion | None = None
-        for _ in range(ITERATIONS):
+        while True:
             # One step: an ordinary problem for what the answer leaves over.
             inner = self._pose_next(answer, share, centre, carried)
             increment = self._prepared.solve(inner)
             result = add(self.step, answer, increment, share)
-            worst = self.certificate(result).worst
             new = self._measure_motion(result.x - centre, increment.active)
-            progress.take(result, worst, new.pace)
-            if progress.certified and progress.vain == 2:
-                return
+            there = _Pass(result, self.certificate(result), False, new)
+            worst = there.worst
+            yield there
             if result.iterations > INNER:
                 raise StepFailure(f"{result.method} took more than {INNER} iterations")
-            if not progress.certified:
+            if not progress.is_certified:
                 self._refuse_flight(new)
 
             # Settled reactions need a share of themselves to change; a larger one when the last did
@@ -218,7 +218,7 @@ class Proximal:
             # Steps that are parallel are summed up at once. Once the tolerance is met they are
             # round-off: to go far along one would shift the body.
             ahead = 0.0
-            if old is not None and not progress.certified:
+            if old is not None and not progress.is_certified:
                 ahead = self._look_ahead(old, new, result)
             old = new if ahead == 0.0 else None
             answer = replace(result, x=result.x + ahead * new.d)

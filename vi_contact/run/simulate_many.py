@@ -121,7 +121,6 @@ class _Turn:
         self.session.last = None
         self.session.loop = None
         self.loop.prepared.clear()
-        self.loop.passes.clear()
 
 
 def _simulate_in_turn(

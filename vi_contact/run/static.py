@@ -15,7 +15,7 @@ would be wrong for points in motion wherever it jumps there.
 """
 
 import logging
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -26,7 +26,7 @@ from ..core.checks import describe_point, number, quote, real
 from ..core.collective import Parts, agree, together
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
-from ..core.stage import Affine, Answer, Stage, complete
+from ..core.stage import Affine, Answer, Stage, complete, pose
 from ..core.state_checks import check_problem_given, check_sizes, initial_state
 from ..core.step import Solver, State, StepProblem, StepResult
 from ..solvers.automatic import Automatic
@@ -118,10 +118,11 @@ class Equilibria:
 
     Where prescribed displacements hold every body, K is positive definite, and a stage is one step
     of the contract (``core.step``) with A = K. Where contact alone holds one, K is singular, and
-    the stage is a sequence of such steps (``proximal``).
+    the stage is a sequence of such steps (``proximal``). That of a body that is not linear is a
+    sequence of steps about where it is (``solvers.nonlinear``).
 
     Attributes:
-        curved: what solves the stages of a body that is not linear, once there was one.
+        solver: of the stages.
     """
 
     def __init__(
@@ -140,33 +141,20 @@ class Equilibria:
         self._K = EffectiveMatrix(
             system.K, system.algebra, space=system.space, inertia=(0.0, system.M)
         )
-        self._solve: Callable[[StepProblem], tuple[StepResult, Certificate]]
-        self.curved: NonlinearSolver | None = None
         refuse_matrix(problem, self._K)
-        self._solver = solver
-        self._tolerance = tolerance
-        if system.internal is not None:
-            if system.floating:
-                raise InputError(
-                    "a static stage of a body that is not linear needs supports that hold it: "
-                    "clamp a part of it, or march from rest with damping"
-                )
+        given = (problem, self._K, 1.0, [solver], tolerance)
+        self.solver: Proximal | CertifiedSolver | NonlinearSolver
+        if system.internal is None and system.floating:
+            self.solver = Proximal(problem, self._K, solver, tolerance)
+        elif system.internal is None:
+            self.solver = CertifiedSolver(*given, advice=ADVICE)
         elif system.floating:
-            proximal = Proximal(problem, self._K, solver, tolerance)
-
-            def approach(step: StepProblem) -> tuple[StepResult, Certificate]:
-                result = proximal.solve(step)
-                return result, proximal.certificate(result)
-
-            self._solve = approach
+            raise InputError(
+                "a static stage of a body that is not linear needs supports that hold it: "
+                "clamp a part of it, or march from rest with damping"
+            )
         else:
-            certified = CertifiedSolver(problem, self._K, 1.0, [solver], tolerance, advice=ADVICE)
-
-            def solve_once(step: StepProblem) -> tuple[StepResult, Certificate]:
-                answer = certified.solve(step)
-                return answer.result, answer.certificate
-
-            self._solve = solve_once
+            self.solver = NonlinearSolver(*given, advice=ADVICE_NONLINEAR)
 
     def _pose_stage(self, old: State, t: float) -> Stage:
         """Return the balance of forces at rest at a time, in d = u - u of the state before.
@@ -203,7 +191,11 @@ class Equilibria:
         with together(problem.surface.comm):
             problem.surface.refuse_driven(t)
             if problem.static_load.internal is not None:
-                return self._solve_nonlinear(old, t)
+                stage = self._pose_stage(old, t)
+                step = pose(problem, stage, self._K, problem.static_load)
+                certified = self.solver.solve(step)
+                answer = complete(stage, step, certified.result)
+                return _stand_still(old, t, answer, certified.certificate)
             step = StepProblem(
                 A=self._K,
                 b=problem.static_load.load.at_rest(t),
@@ -218,29 +210,8 @@ class Equilibria:
                 slip0=problem.slip_origin(old.u, old.t, t),
             )
             refuse_nan(step, lambda: problem.static_load)
-            result, certificate = self._solve(step)
-        return _stand_still(old, t, result, certificate)
-
-    def _solve_nonlinear(self, old: State, t: float) -> State:
-        """Return the equilibrium of a body that is not linear at a time.
-
-        Args:
-            old: the state before.
-            t: the time [s].
-        """
-        stage = self._pose_stage(old, t)
-        if self.curved is None:
-            self.curved = NonlinearSolver(
-                self._problem,
-                stage,
-                [self._solver],
-                self._tolerance,
-                system=self._problem.static_load,
-                advice=ADVICE_NONLINEAR,
-            )
-        step, certified = self.curved.solve(stage)
-        answer = complete(stage, step, certified.result)
-        return _stand_still(old, t, answer, certified.certificate)
+            certified = self.solver.solve(step)
+        return _stand_still(old, t, certified.result, certified.certificate)
 
 
 def _stand_still(

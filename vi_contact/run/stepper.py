@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.algebra import EffectiveMatrix, freeze
+from ..core.algebra import freeze
 from ..core.checks import instance, number
 from ..core.collective import agree, call_user, together, together_if_own
 from ..core.errors import InputError
@@ -26,8 +26,8 @@ from ..core.problem import ContactProblem
 from ..core.protocols import Impact
 from ..core.stage import Stage, average, complete, make_matrix, pose
 from ..core.state_checks import initial_state
-from ..core.step import Report, Scheme, Solver, State, StepProblem
-from ..solvers.certified import TOLERANCE, Certified, CertifiedSolver
+from ..core.step import Report, Scheme, Solver, State
+from ..solvers.certified import TOLERANCE, CertifiedSolver
 from ..solvers.nonlinear import NonlinearSolver
 from .method import Method, choose_method
 
@@ -60,15 +60,13 @@ class Stepper:
         method: scheme, solvers and tolerance.
         state: from which the next attempt starts.
         dt: length of the last accepted step [s]; nan before the first.
-        prepared: length of a step [s] -> its effective matrix and solver, one factor each.
-        passes: the like for a body that is not linear.
+        prepared: length of a step [s] -> its solver, with one factor of its effective matrix.
     """
 
     method: Method
     state: State
     dt: float
-    prepared: dict[float, tuple[EffectiveMatrix, CertifiedSolver]]
-    passes: dict[float, NonlinearSolver]
+    prepared: dict[float, CertifiedSolver | NonlinearSolver]
 
     def __init__(
         self,
@@ -127,7 +125,6 @@ class Stepper:
         self.state = state
         self.dt = float("nan")
         self.prepared = {}
-        self.passes = {}
 
     def attempt(self, dt: float) -> Trial:
         """Make a step from the state, which stays where it is. Collective.
@@ -141,10 +138,9 @@ class Stepper:
         """
         number("Stepper.attempt", "dt", dt, positive=True)
         agree(self.method.problem.surface.comm, "Stepper.attempt", {"dt": dt})
-        for kept in (self.prepared, self.passes):
-            while len(kept) >= FACTORS and dt not in kept:
-                oldest = next(iter(kept))
-                del kept[oldest]  # type: ignore[attr-defined]
+        while len(self.prepared) >= FACTORS and dt not in self.prepared:
+            oldest = next(iter(self.prepared))
+            del self.prepared[oldest]
         return Trial(self._attempt(float(dt)), float(dt))
 
     def accept(self, trial: Trial) -> State:
@@ -188,7 +184,7 @@ class Stepper:
     def _make_step(self, dt: float) -> Report:
         """Do the work of ``_attempt``, in its frame of all ranks."""
         problem = self.method.problem
-        scheme = self.method.scheme
+        scheme: Any = self.method.scheme
         surface = problem.surface
         state = self._convert_state(dt)
 
@@ -197,10 +193,13 @@ class Stepper:
             stage = scheme.stage(problem, state, dt)
         if surface.watched:
             surface.refuse_driven(stage.t)
-        if problem.equations.internal is None:
-            stage, step, certified = self._solve_linear(stage, state, dt)
-        else:
-            step, certified = self._solve_nonlinear(stage, dt)
+        solver = self._prepare(stage, dt)
+        step = pose(problem, stage, solver.A)
+        if hasattr(scheme, "press"):  # a law of its own at the contact
+            with together_if_own(surface.comm, scheme):
+                stage = scheme.press(problem, state, stage, step, dt)
+            step = pose(problem, stage, solver.A)
+        certified = solver.solve(step)
         answer = complete(stage, step, certified.result)
 
         # Displacements and velocities at its end: of the scheme, then of the impact law.
@@ -223,47 +222,22 @@ class Stepper:
             escalated=certified.escalated,
         )
 
-    def _solve_linear(
-        self, stage: Stage, state: State, dt: float
-    ) -> tuple[Stage, StepProblem, Certified]:
-        """Solve a step of a linear body: one pass, with the factor of this dt.
+    def _prepare(self, stage: Stage, dt: float) -> CertifiedSolver | NonlinearSolver:
+        """Return the solver of steps of dt [s], made at the first of them.
 
         Args:
-            stage: the balance.
-            state: at the beginning of the step.
+            stage: the balance of this step.
             dt: length of the step [s].
-
-        Returns:
-            The balance, with what a law of the scheme's own adds; the step; its answer.
         """
-        problem = self.method.problem
-        scheme: Any = self.method.scheme
         if dt not in self.prepared:
             method = self.method
-            A = make_matrix(problem.equations, stage)
-            solver = CertifiedSolver(problem, A, stage.scale, method.solvers, method.tolerance)
-            self.prepared[dt] = (A, solver)
-        A, solver = self.prepared[dt]
-        step = pose(problem, stage, A)
-        if hasattr(scheme, "press"):  # a law of its own at the contact
-            with together_if_own(problem.surface.comm, scheme):
-                stage = scheme.press(problem, state, stage, step, dt)
-            step = pose(problem, stage, A)
-        return stage, step, solver.solve(step)
-
-    def _solve_nonlinear(self, stage: Stage, dt: float) -> tuple[StepProblem, Certified]:
-        """Solve a step of a body that is not linear: certified passes about the reference.
-
-        Args:
-            stage: the balance.
-            dt: length of the step [s].
-        """
-        if dt not in self.passes:
-            method = self.method
-            self.passes[dt] = NonlinearSolver(
-                method.problem, stage, method.solvers, method.tolerance
+            equations = method.problem.equations
+            kind = CertifiedSolver if equations.internal is None else NonlinearSolver
+            A = make_matrix(equations, stage)
+            self.prepared[dt] = kind(
+                method.problem, A, stage.scale, method.solvers, method.tolerance
             )
-        return self.passes[dt].solve(stage)
+        return self.prepared[dt]
 
 
 def after_impact(

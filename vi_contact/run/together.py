@@ -125,7 +125,7 @@ class Group:
 
     ``_runs`` are its members, in the order of the rows, none when it has dissolved. ``_problem`` is
     that of all runs, whose loads are rows; ``_problems`` are their own. The states are there twice:
-    ``_many`` as rows, ``_states`` one by one. ``_A`` and ``_solver`` are for steps of ``_dt`` [s].
+    ``_many`` as rows, ``_states`` one by one. ``_solver`` is for steps of ``_dt`` [s].
     """
 
     def __init__(self, runs: Sequence[Together]) -> None:
@@ -134,7 +134,6 @@ class Group:
         self._tolerance = method.tolerance
         self._base = runs[0].base
         self._dt: float | None = None  # None before the first step
-        self._A: Any = None
         self._solver: Any = None  # CertifiedSolver, once there is a step
         self._go_on_with(list(runs), [run.state for run in runs])
 
@@ -192,16 +191,10 @@ class Group:
             states.append(self._scheme.start(problem, self._states[row], dt))
         self._take_states(states)
         self._dt = dt
-        self._A = None
         self._solver = None
 
     def _solve(self, many: StepProblem, steps: LazyRows) -> Any:
         """Return the answers of the first solver to all rows, None if it cannot take them so."""
-        if self._solver is None:
-            solvers = self._runs[0].method.solvers
-            self._solver = CertifiedSolver(
-                self._problem, self._A, many.scale, solvers, self._tolerance
-            )
         first = self._solver.first
         if not hasattr(first, "solve_many"):
             return None
@@ -214,9 +207,11 @@ class Group:
             dt: the length of the step [s].
         """
         stage = self._scheme.stage(self._problem, self._many, dt)
-        if self._A is None:
-            self._A = make_matrix(self._problem.equations, stage)
-        return stage, pose(self._problem, stage, self._A)
+        if self._solver is None:
+            A = make_matrix(self._problem.equations, stage)
+            solvers = self._runs[0].method.solvers
+            self._solver = CertifiedSolver(self._problem, A, stage.scale, solvers, self._tolerance)
+        return stage, pose(self._problem, stage, self._solver.A)
 
     def _step(self, dt: float) -> list[Together]:
         """Make a step and hand out its reports, or the runs that cannot make it.
@@ -248,7 +243,7 @@ class Group:
             return list(runs)
         if dt not in runs[0].prepared:  # for the steps that a run makes alone
             for run in runs:
-                run.prepared = {dt: (self._A, self._solver)}
+                run.prepared = {dt: self._solver}
 
         # Each answer gets its certificate, then states and reports are made.
         parts = {"step": steps, "result": LazyRows(answers.own)}

@@ -6,43 +6,27 @@ judged.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from ..core.algebra import EffectiveMatrix
-from ..core.certificate import Certificate
 from ..core.checks import on_all
 from ..core.collective import together_if_own
 from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
-from ..core.step import PreparedSolver, Solver, StepProblem, StepResult
+from ..core.step import PreparedSolver, Solver, StepProblem
 from ..core.surfaces import ContactSurface
 from ..core.timing import report_time
 from ..core.verify import kkt_residual
 from .correction import correct
-from .door import refuse_matrix, refuse_nan
+from .door import Source, refuse_matrix, refuse_nan
+from .passes import Certified
 
 TOLERANCE = 1e-9
 # of the tolerance: round-off of ordinary steps stays a hundred times below, and is left as it is
 NEAR = 1e-2
 FAR = 1e-4  # residuals above are not round-off
 ADVICE = "try a smaller dt or another solver, or check the data of this time"
-
-
-@dataclass(frozen=True)
-class Certified:
-    """Hold an answer with its certificate.
-
-    Attributes:
-        result: the answer.
-        certificate: below the tolerance.
-        escalated: whether it is by a method that was escalated to.
-    """
-
-    result: StepResult
-    certificate: Certificate
-    escalated: bool
 
 
 class CertifiedSolver:
@@ -53,7 +37,7 @@ class CertifiedSolver:
 
     def __init__(
         self,
-        problem: ContactProblem,
+        problem: ContactProblem | None,
         A: EffectiveMatrix,
         scale: float,
         solvers: Sequence[Solver],
@@ -65,7 +49,7 @@ class CertifiedSolver:
         """Check the problem, and prepare the first solver. Collective.
 
         Args:
-            problem: the contact problem.
+            problem: the contact problem; None of a condensed body, which has a surface alone.
             A: the effective matrix of its steps.
             scale: of reactions, over which compliances are divided.
             solvers: the solver, and the methods to escalate to.
@@ -76,17 +60,21 @@ class CertifiedSolver:
         Raises:
             InputError: the problem, or a matrix that is not finite, does not suit a solver.
         """
-        for solver in solvers:
-            solver.check(problem)
-        self._problem = problem
+        self._source: Source | None = None
+        if problem is not None:
+            for solver in solvers:
+                solver.check(problem)
+            refuse_matrix(problem, A)
+            self._source = lambda: problem.equations
+            surface = surface or problem.surface
+        assert surface is not None  # that of a condensed body is given
+        self._surface = surface
         self.A = A
         self._scale = scale
         self._solvers = solvers
         self._tolerance = tolerance
-        self._surface = surface or problem.surface
         self._advice = advice
         self._prepared: dict[int, PreparedSolver] = {}
-        refuse_matrix(problem, A)
         self._get(0)
 
     @property
@@ -108,7 +96,7 @@ class CertifiedSolver:
             StepFailure: no method has such an answer; the error says what each one gave.
         """
         # One method after another, until an answer has a certificate.
-        refuse_nan(step, lambda: self._problem.equations)
+        refuse_nan(step, self._source)
         failures = []
         for place, solver in enumerate(self._solvers):
             try:
@@ -117,17 +105,16 @@ class CertifiedSolver:
             except StepFailure as failure:
                 failures.append(str(failure))
                 continue
-            certificate = kkt_residual(step, result)
+            answer = Certified(result, kkt_residual(step, result), place > 0)
 
             # Round-off that comes near the tolerance is corrected; larger residuals have causes
             # that no correction removes, and no solver is asked for more than it aims at.
             goal = NEAR * self._tolerance
-            if max(goal, result.aim) < certificate.worst < FAR:
-                solve = self._get(place).solve
-                result, certificate = correct(step, result, certificate, solve, goal)
-            if certificate.worst <= self._tolerance:
-                return Certified(result, certificate, place > 0)
-            failures.append(f"{result.method}: {certificate}")
+            if max(goal, result.aim) < answer.worst < FAR:
+                answer = correct(step, answer, self._get(place).solve, goal)
+            if answer.worst <= self._tolerance:
+                return answer
+            failures.append(f"{result.method}: {answer.certificate}")
         raise StepFailure(
             f"step {step.k} at t = {step.t:.6g} s stayed above the certificate tolerance "
             f"{self._tolerance:g} ({'; '.join(failures)}): {self._advice}"

@@ -15,18 +15,18 @@ A⁻¹Bᵀq, and their round-off is now s times what it was. Where a stiff body 
 on nothing but contact, A⁻¹Bᵀr is millions of times x.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..core.algebra import Array
-from ..core.certificate import Certificate
 from ..core.collective import ask_limit
 from ..core.errors import StepFailure
 from ..core.protocols import FrictionLaw
 from ..core.step import StepProblem, StepResult
 from ..core.verify import kkt_residual
+from .passes import Certified, Passes, certify, pose_about
 
 # share over residual: reactions may be that much more wrong than the residual tells
 MARGIN = 2.0**10
@@ -86,21 +86,12 @@ def pose_remainder(step: StepProblem, answer: StepResult, share: float) -> StepP
     surface = step.surface
     x = answer.x
     r_n, r_t = keep_reactions(step, answer, share)
-    friction = step.friction
-    slip0 = None
-    if step.slip0 is not None:
-        slip0 = step.slip0 - surface.tangential_values(x)
-        if share != 1.0:
-            friction = Share(friction, share)
+    b = step.b - step.A @ x - surface.reaction_load(r_n, len(x), r_t)
+    posed = pose_about(step, x, b, answer.active)
     return replace(
-        step,
-        b=step.b - step.A @ x - surface.reaction_load(r_n, len(x), r_t),
-        bound=step.bound - surface.normal_values(x) + surface.compliance * r_n / step.scale,
-        guess=np.zeros_like(x),
-        origin=x if step.origin is None else step.origin + x,
-        active=answer.active,
-        friction=friction,
-        slip0=slip0,
+        posed,
+        bound=posed.bound + surface.compliance * r_n / step.scale,
+        friction=step.friction if share == 1.0 else Share(step.friction, share),
     )
 
 
@@ -154,36 +145,42 @@ def keep_reactions(
 
 def correct(
     step: StepProblem,
-    result: StepResult,
-    certificate: Certificate,
+    answer: Certified,
     solve: Callable[[StepProblem], StepResult],
     goal: float,
-) -> tuple[StepResult, Certificate]:
+) -> Certified:
     """Correct an answer until its certificate is at the goal, or as near as it gets. Collective.
 
     Args:
         step: the step.
-        result: its answer.
-        certificate: that of the answer.
+        answer: its answer.
         solve: the solver.
         goal: the residual to come to.
 
     Returns:
-        The corrected answer, and its certificate.
+        The corrected answer.
     """
-    for _ in range(ROUNDS):
-        before = certificate.worst
-        share = choose_share(before)
+    passes = Passes(tolerance=np.inf, goal=goal, best=answer)
+    certify(passes, _make_corrections(step, passes, solve), ROUNDS)
+    return passes.best or answer
+
+
+def _make_corrections(
+    step: StepProblem, passes: Passes[Certified], solve: Callable[[StepProblem], StepResult]
+) -> Iterator[Certified]:
+    """Yield the best answer with what it left over, as long as the solver finds that. Collective.
+
+    Args:
+        step: the step.
+        passes: the answers so far.
+        solve: the solver.
+    """
+    while passes.best is not None:
+        best = passes.best.result
+        share = choose_share(passes.least)
         try:
-            rest = solve(pose_remainder(step, result, share))
+            rest = solve(pose_remainder(step, best, share))
         except StepFailure:
-            break
-        better = add(step, result, rest, share)
-        judged = kkt_residual(step, better)
-        if not judged.worst < before:
-            break
-        result = replace(better, method=result.method, history=result.history)
-        certificate = judged
-        if not goal < judged.worst < 0.5 * before:
-            break
-    return result, certificate
+            return
+        better = replace(add(step, best, rest, share), method=best.method, history=best.history)
+        yield replace(passes.best, result=better, certificate=kkt_residual(step, better))

@@ -11,7 +11,7 @@ a linear step of the contract, for the change that is missing and for the *whole
 
 so that contact is exact in every pass, and a fixed point satisfies the equations as they are. The
 certificate is that of the nonlinear equations: ``kkt_residual`` with rest(d) in the place of
-b - A d.
+b - A d. The loop is that of ``passes``.
 
 A is m M + c C + k K with the reference stiffness K, whose factor is made once. Passes with it
 converge linearly and are accelerated (``acceleration``). K is replaced by the tangent p'(u) where
@@ -26,7 +26,7 @@ obstacle, is gone as a whole where the forces at its end are numbers.
 """
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
 from math import log as ln
@@ -34,21 +34,19 @@ from math import log as ln
 import numpy as np
 
 from ..core.algebra import Array, EffectiveMatrix, Mask, Matrix, largest
-from ..core.certificate import Certificate
 from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
-from ..core.stage import Stage, find_rest, make_matrix, pose
+from ..core.stage import NonlinearForces, add_increment
 from ..core.step import Solver, StepProblem, StepResult
-from ..core.system import SemiDiscreteSystem
 from ..core.verify import kkt_residual
 from .acceleration import Anderson
-from .certified import ADVICE, NEAR, Certified, CertifiedSolver
+from .certified import ADVICE, NEAR, CertifiedSolver
 from .line_search import FLAT, find_finite, find_flat
+from .passes import Certified, Passes, certify, pose_about
 
 log = logging.getLogger(__name__)
 
 MOST = 60  # passes of a step
-SETTLED = 0.5  # of the residual before: a pass that gains less brings no more digits
 # Passes with the reference that a new tangent with its factor costs, over the root of the unknowns
 # over their logarithm in the plane, and over their power 2/3 in space (measured: 15 and 45 passes
 # at 2e4 unknowns, which are the exponents of nested dissection).
@@ -77,56 +75,43 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Pass:
-    """Hold where a pass has led.
+class Pass(Certified):
+    """Hold where a pass has led: its answer has x = d, its certificate is of the nonlinear step.
 
     Attributes:
         place: its end.
-        result: its answer, with x = d.
-        certificate: of the nonlinear step.
     """
 
     place: Place
-    result: StepResult
-    certificate: Certificate
 
 
 @dataclass
 class Walk:
-    """Hold how far the passes of one step have come.
+    """Hold where the next pass of one step starts, and how it is made.
 
     Attributes:
-        stage: the balance.
-        whole: the step at the guess.
+        whole: the step.
+        forces: of the step.
         here: where the next pass starts.
         base: the last place that no extrapolation has made.
-        outside: whether ``base`` is outside of the obstacle, as the end of every pass is.
         solver: of the passes.
         acceleration: what the passes with this matrix have shown.
-        best: the pass with the smallest residual, None before the first one.
-        rate: its residual over the one before; 1 where nothing is known of it.
+        outside: whether ``base`` is outside of the obstacle, as the end of every pass is.
         tangent_due: whether the next pass is one with a new tangent.
         care: how many tangents were of no use: place in ``SHARES`` of the next one.
         escalated: whether a pass was by a method that was escalated to.
     """
 
-    stage: Stage
     whole: StepProblem
+    forces: NonlinearForces
     here: Place
     base: Place
     solver: CertifiedSolver
     acceleration: Anderson
     outside: bool = False
-    best: Pass | None = None
-    rate: float = 1.0
     tangent_due: bool = False
     care: int = 0
     escalated: bool = False
-
-    @property
-    def least(self) -> float:
-        """Return the smallest residual so far."""
-        return np.inf if self.best is None else self.best.certificate.worst
 
     @property
     def refused(self) -> bool:
@@ -145,80 +130,93 @@ class NonlinearSolver:
     def __init__(
         self,
         problem: ContactProblem,
-        stage: Stage,
+        A: EffectiveMatrix,
+        scale: float,
         solvers: Sequence[Solver],
         tolerance: float,
         *,
-        system: SemiDiscreteSystem | None = None,
         advice: str = ADVICE,
     ) -> None:
         """Prepare the reference. Collective.
 
         Args:
             problem: the contact problem.
-            stage: of any step of this length.
+            A: the effective matrix of its steps, with the reference stiffness.
+            scale: of reactions, over which compliances are divided.
             solvers: of linear steps, and the methods to escalate to.
             tolerance: the largest residual of a certificate.
-            system: the equations of the steps; None: those that are marched.
             advice: end of the sentence that refuses a step.
         """
         self._problem = problem
-        self._system = problem.equations if system is None else system
+        self._scale = scale
         self._solvers = solvers
         self._tolerance = tolerance
         self._advice = advice
         self.tangents = 0
         self.counts: list[int] = []
-        self.A = make_matrix(self._system, stage)
-        self._reference = self._prepare(stage, self.A)
+        self.A = A
+        self._reference = self._prepare(A)
         self._cost = _count_passes_of_a_factor(problem)
 
-    def _prepare(self, stage: Stage, A: EffectiveMatrix) -> CertifiedSolver:
+    def _prepare(self, A: EffectiveMatrix) -> CertifiedSolver:
         """Return the certified solver of linear steps with a matrix."""
         return CertifiedSolver(
-            self._problem, A, stage.scale, self._solvers, self._tolerance, advice=self._advice
+            self._problem, A, self._scale, self._solvers, self._tolerance, advice=self._advice
         )
 
-    def solve(self, stage: Stage) -> tuple[StepProblem, Certified]:
-        """Return the step at the guess, and its certified answer with x = d. Collective.
+    def solve(self, step: StepProblem) -> Certified:
+        """Return the certified answer of a step, x = d. Collective.
 
         Raises:
             StepFailure: no pass came below the tolerance, or a linear step has no answer.
         """
-        walk = self._begin(stage)
-        for count in range(1, MOST + 1):
-            there = self._make_pass(walk)
-            if there is None:
-                continue
-            if self._is_answer(walk, there):
-                return walk.whole, self._finish(walk, count)
-            if walk.best is there:
-                self._extrapolate(walk, there)
-            else:
-                self._fall_back(walk, there)
-        self.counts.append(MOST)
-        reached = "" if walk.best is None else f" ({walk.best.certificate})"
+        walk = self._begin(step)
+        passes: Passes[Pass] = Passes(tolerance=self._tolerance, goal=NEAR * self._tolerance)
+        is_certified = certify(passes, self._go(walk, passes), MOST)
+        self.counts.append(passes.count)
+        best = passes.best
+        if best is not None and is_certified:
+            log.debug("%s: %d linear steps, %s", _name(step), passes.count, best.certificate)
+            return replace(best, result=replace(best.result, iterations=passes.count))
+        reached = "" if best is None else f" ({best.certificate})"
         if walk.care:
             reached += "; its tangent is not positive there, as that of a body that gives way"
         raise StepFailure(
-            f"{_name(walk)} did not come below the certificate tolerance {self._tolerance:g} in "
+            f"{_name(step)} did not come below the certificate tolerance {self._tolerance:g} in "
             f"{MOST} linear steps{reached}: {self._advice}"
         )
 
-    def _begin(self, stage: Stage) -> Walk:
-        """Return the walk that begins at the guess of a stage. Collective.
+    def _begin(self, step: StepProblem) -> Walk:
+        """Return the walk that begins at the guess of a step. Collective.
 
         Raises:
             StepFailure: the internal force is no number there, as that of a body inside out.
         """
-        whole = pose(self._problem, stage, self.A, self._system)
-        start = Place(whole.guess, whole.b, whole.active)
-        walk = Walk(stage, whole, start, start, self._reference, self._make_acceleration())
-        if whole.internal is not None and not self._is_finite(whole.internal):
+        forces = step.forces
+        assert isinstance(forces, NonlinearForces)  # linear bodies have no walk
+        if step.internal is not None and not self._is_finite(step.internal):
             raise StepFailure(
-                f"{_name(walk)} begins where its internal force is NaN or infinite: {self._advice}"
+                f"{_name(step)} begins where its internal force is NaN or infinite: {self._advice}"
             )
-        return walk
+        start = Place(step.guess, step.b, step.active)
+        return Walk(step, forces, start, start, self._reference, self._make_acceleration())
+
+    def _go(self, walk: Walk, passes: Passes[Pass]) -> Iterator[Pass]:
+        """Yield passes, each from where the ones before point to. Collective.
+
+        Args:
+            walk: where the first one starts.
+            passes: what they have shown.
+        """
+        while True:
+            there = self._make_pass(walk)
+            if there is None:
+                continue  # another way is open, of which there are few
+            yield there
+            if passes.best is there:
+                self._extrapolate(walk, there, passes)
+            else:
+                self._fall_back(walk, there)
 
     def _make_acceleration(self) -> Anderson:
         return Anderson(self._problem.surface.comm.sum)
@@ -238,9 +236,11 @@ class NonlinearSolver:
         try:
             if walk.tangent_due:
                 self._take_tangent(walk)
-            linear = walk.solver.solve(self._pose_about(walk))
+            here = walk.here
+            posed = pose_about(walk.whole, here.d, here.rest, here.active, walk.solver.A)
+            linear = walk.solver.solve(posed)
         except (InputError, StepFailure) as refusal:
-            log.debug("%s: a pass is of no use (%s)", _name(walk), refusal)
+            log.debug("%s: a pass is of no use (%s)", _name(walk.whole), refusal)
             of_tangent = walk.tangent_due or walk.solver is not self._reference
             if of_tangent:  # one that is not positive has no factor or no answer
                 self._refuse_tangent(walk)
@@ -250,35 +250,32 @@ class NonlinearSolver:
                 self._go_back(walk)
             return None
         walk.escalated = walk.escalated or linear.escalated
-        return self._judge(walk, linear.result)
+        return self._judge(walk, posed, linear.result)
 
     def _take_tangent(self, walk: Walk) -> None:
         """Go on with the tangent of where the walk is. Collective."""
-        stage = walk.stage
-        internal = self._system.internal
-        assert internal is not None  # linear bodies have no walk
         self.tangents += 1
         walk.solver = self._reference  # the tangent before gives its memory back
-        tangent = internal.tangent(stage.find_place(walk.here.d))
+        tangent = walk.forces.find_tangent(walk.here.d)
         if walk.care:
-            tangent = self._brace(tangent, walk.here.active, SHARES[walk.care])
-        walk.solver = self._prepare(stage, make_matrix(self._system, stage, tangent))
+            tangent = self._brace(walk, tangent, SHARES[walk.care])
+        walk.solver = self._prepare(walk.forces.make_matrix(tangent))
         walk.acceleration = self._make_acceleration()
         walk.tangent_due = False
 
-    def _brace(self, tangent: Matrix, closed: Mask, share: float) -> Matrix:
+    def _brace(self, walk: Walk, tangent: Matrix, share: float) -> Matrix:
         """Return a tangent with stiff springs at closed points, and a share of the reference.
 
         Without its contact a compressed body may be about to buckle. The springs change nothing in
         the answer of a pass whose closed points stay closed, as these do not move then.
 
         Args:
+            walk: where the tangent is taken.
             tangent: p'(u).
-            closed: (m,) points.
             share: of K, in the place of as much of the tangent.
         """
-        system = self._system
-        rows = self._problem.surface.owned[closed]
+        system = walk.forces.system
+        rows = walk.whole.surface.owned[walk.here.active]
         springs = BRACE * np.abs(system.K.diagonal()[rows])
         brace = system.algebra.local(rows, rows, springs, system.rows)
         return system.algebra.combine([(1.0 - share, tangent), (share, system.K), (1.0, brace)])
@@ -299,64 +296,22 @@ class NonlinearSolver:
         walk.acceleration = self._make_acceleration()
         walk.tangent_due = not walk.refused
 
-    def _pose_about(self, walk: Walk) -> StepProblem:
-        """Return the linear step about where the walk is."""
-        whole = walk.whole
-        surface = whole.surface
-        here = walk.here
-        slip0 = whole.slip0
-        if slip0 is not None:
-            slip0 = slip0 - surface.tangential_values(here.d)
-        return replace(
-            whole,
-            A=walk.solver.A,
-            b=here.rest,
-            bound=whole.bound - surface.normal_values(here.d),
-            slip0=slip0,
-            active=here.active,
-            origin=here.d if whole.origin is None else whole.origin + here.d,
-        )
-
-    def _judge(self, walk: Walk, result: StepResult) -> Pass:
+    def _judge(self, walk: Walk, posed: StepProblem, result: StepResult) -> Pass:
         """Return where a linear step has led, with the certificate of the equations as they are.
 
         Args:
             walk: so far.
-            result: the answer of the step.
+            posed: the linear step.
+            result: its answer.
         """
         whole = walk.whole
-        surface = whole.surface
-        d0 = walk.here.d
-        d = d0 + result.x
-
-        # Rounding of the sum must not open a closed point, nor move one that sticks.
-        bound = whole.bound - surface.normal_values(d0)
-        closed: Mask = surface.normal_values(result.x) == bound
-        surface.put_normal(d, whole.bound, closed)
-        if whole.slip0 is not None:
-            slip0 = whole.slip0 - surface.tangential_values(d0)
-            sticks = surface.tangential_values(result.x) == slip0
-            surface.put_tangential(d, whole.slip0, sticks)
-        rest = find_rest(self._system, walk.stage, d)
+        d = add_increment(walk.here.d, whole.bound, whole.slip0, posed, result)
+        rest = walk.forces.find_rest(d)
         answer = replace(result, x=d)
-        certificate = kkt_residual(whole, answer, whole.b - rest)
-        return Pass(Place(d, rest, result.active), answer, certificate)
+        certificate = kkt_residual(whole, answer, rest)
+        return Pass(answer, certificate, walk.escalated, Place(d, rest, result.active))
 
-    def _is_answer(self, walk: Walk, there: Pass) -> bool:
-        """Take a pass into account, and tell whether the best one is the answer.
-
-        It is one far below the tolerance, or below it where this pass gains nothing more.
-        """
-        worst = there.certificate.worst
-        before = walk.least
-        if worst < before:
-            walk.rate = worst / before if isfinite(before) else 1.0
-            walk.best = there
-        if worst <= NEAR * self._tolerance:
-            return True
-        return walk.least <= self._tolerance and worst > SETTLED * before
-
-    def _extrapolate(self, walk: Walk, there: Pass) -> None:
+    def _extrapolate(self, walk: Walk, there: Pass, passes: Passes[Pass]) -> None:
         """Go on from the best pass so far, or from where it points to. Collective."""
         end = there.place
         start = walk.here
@@ -365,19 +320,19 @@ class NonlinearSolver:
         walk.outside = True
         d = walk.acceleration.extrapolate(start.d, end.d - start.d)
         if len(walk.acceleration.points) > 1:
-            rest = find_rest(self._system, walk.stage, d)
+            rest = walk.forces.find_rest(d)
             if self._is_finite(rest):
                 walk.here = Place(d, rest, end.active)
-        walk.tangent_due = self._wants_tangent(walk)
+        walk.tangent_due = not walk.refused and self._wants_tangent(passes)
 
-    def _wants_tangent(self, walk: Walk) -> bool:
+    def _wants_tangent(self, passes: Passes[Pass]) -> bool:
         """Tell whether the passes that are still expected cost more than a new factor.
 
         With the rate of the best pass so many are expected: log(aim/residual) / log(rate).
         """
-        if walk.rate == 1.0 or walk.refused:
+        if passes.rate == 1.0:
             return False
-        left = ln(NEAR * self._tolerance / walk.least) / ln(walk.rate)
+        left = ln(passes.goal / passes.least) / ln(passes.rate)
         return left > self._cost + MARGIN
 
     def _fall_back(self, walk: Walk, there: Pass) -> None:
@@ -408,7 +363,7 @@ class NonlinearSolver:
         def ask(part: float) -> tuple[Place, float]:
             """Return the place after a part of the way, and the slope there."""
             d = start.d + part * way
-            place = Place(d, find_rest(self._system, walk.stage, d), end.active)
+            place = Place(d, walk.forces.find_rest(d), end.active)
             return place, self._find_slope(there, place.rest, way)
 
         # Out of a moved obstacle the whole way is gone, and so is one that still leads down.
@@ -424,7 +379,8 @@ class NonlinearSolver:
             place = start
         if place is None:
             raise StepFailure(
-                f"{_name(walk)}: no part of a linear step leads to less energy: {self._advice}"
+                f"{_name(walk.whole)}: no part of a linear step leads to less energy: "
+                f"{self._advice}"
             )
         return place
 
@@ -443,22 +399,13 @@ class NonlinearSolver:
         if there.result.r_t is not None:
             nothing = np.zeros_like(there.result.r_n)
             force = rest - surface.reaction_load(nothing, len(rest), there.result.r_t)
-        slope = -self._system.algebra.dot(force, way)
+        slope = -self._problem.system.algebra.dot(force, way)
         return slope if isfinite(slope) else np.inf
 
-    def _finish(self, walk: Walk, count: int) -> Certified:
-        """Return the best pass as the certified answer of the step."""
-        best = walk.best
-        assert best is not None  # it is the answer
-        log.debug("%s: %d linear steps, %s", _name(walk), count, best.certificate)
-        self.counts.append(count)
-        return Certified(replace(best.result, iterations=count), best.certificate, walk.escalated)
 
-
-def _name(walk: Walk) -> str:
+def _name(step: StepProblem) -> str:
     """Return the step in words."""
-    whole = walk.whole
-    return f"step {whole.k} at t = {whole.t:.6g} s of a body that is not linear"
+    return f"step {step.k} at t = {step.t:.6g} s of a body that is not linear"
 
 
 def _count_passes_of_a_factor(problem: ContactProblem) -> float:

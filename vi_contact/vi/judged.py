@@ -98,6 +98,11 @@ class Judged:
             worst = np.full(len(worst), np.inf)
         self.certificate = Certificate(*worst.tolist())
 
+    @property
+    def worst(self) -> float:
+        """Return the largest residual of the certificate."""
+        return self.certificate.worst
+
     def measure_natural_residual(self, x: Array, F: Array) -> float:
         """Return the size sum J_ii r² of the natural residual r. Collective.
 

@@ -181,8 +181,8 @@ class LinearSteps:
         )
 
 
-def find_reduced_step(point: Judged) -> Array:
-    """Return where one step of Newton's method for the natural residual leads.
+def find_reduced_step(point: Judged) -> tuple[Array, int, str]:
+    """Return where one step of Newton's method for the natural residual leads, as ``solve`` does.
 
     Where a bound holds an unknown in that residual, lower + F/J_ii >= x or x >= upper + F/J_ii, the
     step goes to the bound; the others are free:
@@ -211,4 +211,4 @@ def find_reduced_step(point: Judged) -> Array:
         raise StepFailure(
             "the Jacobian is singular on the unknowns that are off their bounds"
         ) from None
-    return x + step
+    return x + step, 1, "reduced step"

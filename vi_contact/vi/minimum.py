@@ -62,7 +62,8 @@ def minimise(
         of negative curvature is found; or with a failure.
     """
     equations.measure_work_from(None)
-    progress = Progress(begin(equations, lower, upper), method=METHOD)
+    point = begin(equations, lower, upper)
+    progress = Progress(best=point, tolerance=tolerance, goal=tolerance, method=METHOD)
     while progress.best.left and not progress.failure:
         carry_conditions(progress, layers)
     if not progress.failure:
@@ -90,7 +91,7 @@ def carry_conditions(progress: Progress, layers: OptionLayers) -> None:
                 equations.put(np.clip(equations.x, point.lower, point.upper))
             next_point = Judged(equations, point.lower, point.upper, left)
             if not next_point.broken:
-                progress.advance(next_point)
+                go_on(progress, next_point)
                 progress.inner += iterations
                 return
         length *= 0.5
@@ -98,6 +99,12 @@ def carry_conditions(progress: Progress, layers: OptionLayers) -> None:
         "Dirichlet conditions or bounds lead where the energy is not a number: take a smaller "
         "load step"
     )
+
+
+def go_on(progress: Progress, point: Judged) -> None:
+    """Count a step that has led to less energy."""
+    progress.best = point
+    progress.count += 1
 
 
 @np.errstate(over="ignore", invalid="ignore")  # energies that have no minimum
@@ -147,8 +154,8 @@ def _follow(
         if is_stationary:
             first = model.measure_length(step)
             radius = first
-        if progress.steps >= limit or radius > UNBOUNDED * first:
-            progress.failure = TOO_FEW if progress.steps >= limit else NO_DESCENT
+        if progress.count >= limit or radius > UNBOUNDED * first:
+            progress.failure = TOO_FEW if progress.count >= limit else NO_DESCENT
             break
         length = model.measure_length(step)
         trial, ratio = _try_step(model, point, step, energy)
@@ -163,7 +170,7 @@ def _follow(
                 energy = trial
                 equations.measure_work_from(point.x, energy)
                 model = Model(point, layers)
-                progress.advance(point)
+                go_on(progress, point)
                 share = 1.0
                 continue
             # Judging the broken point has replaced the Jacobian of this one: judge it again.

@@ -11,12 +11,14 @@ cell.
 """
 
 import logging
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..core.algebra import Array
 from ..core.errors import StepFailure
+from ..solvers.passes import Passes, certify
 from .equations import Equations
 from .judged import Judged
 from .linear_steps import LinearSteps, find_reduced_step
@@ -41,15 +43,15 @@ UNHELD = (
 )
 
 
-@dataclass
-class Progress:
+@dataclass(kw_only=True)
+class Progress(Passes[Judged]):
     """Hold how far a method has come.
 
     Attributes:
         best: the best u so far, judged.
+        count: number of steps.
         at_once: whether all conditions were met from the start.
-        steps: number of steps.
-        inner: number of iterations of the inner method in them.
+        inner: number of iterations of the inner method in the steps.
         method: the inner method of the last step.
         failure: why it stopped without an answer; empty where it has one or goes on.
         doubted: whether an inner method for positive Jacobians has failed.
@@ -57,16 +59,17 @@ class Progress:
 
     best: Judged
     at_once: bool = False
-    steps: int = 0
     inner: int = 0
     method: str = ""
     failure: str = ""
     doubted: bool = False
 
-    def advance(self, best: Judged) -> None:
-        """Count a step that has led to a better u."""
-        self.best = best
-        self.steps += 1
+    def is_better(self, there: Judged) -> bool:
+        """Say whether a u is the best so far.
+
+        While conditions are still to be met no certificate is finite, and the last u is the best.
+        """
+        return there.worst < self.least or self.best.left > 0.0
 
 
 def begin(equations: Equations, lower: Array, upper: Array, *, carry: bool = True) -> Judged:
@@ -128,13 +131,13 @@ def solve_in_parts(
     equations.put_back()
     reached = 0.0
     part = 1.0 if whole.at_once else 0.5
-    count = whole.steps
+    count = whole.count
     inner = whole.inner
     while part >= SMALLEST_PART:
         before = np.array(equations.u.x.array)
         equations.aim(reached + part)
         progress = run_newton(equations, lower, upper, steps, min(limit, STEPS_OF_A_PART))
-        count += progress.steps
+        count += progress.count
         inner += progress.inner
         if progress.failure:
             equations.u.x.array[:] = before
@@ -143,7 +146,7 @@ def solve_in_parts(
         equations.put(progress.best.x)
         reached += part
         if reached == 1.0:
-            progress.steps = count
+            progress.count = count
             progress.inner = inner
             return progress
     equations.put_back()
@@ -172,29 +175,31 @@ def run_newton(
         carry: see ``begin``.
     """
     point = begin(equations, lower, upper, carry=carry)
-    progress = Progress(point, at_once=point.left == 0.0)
+    tolerance = steps.settings.tolerance
+    progress = Progress(best=point, tolerance=tolerance, goal=tolerance, at_once=point.left == 0.0)
     steps.begin()
     limit = min(limit, REFINEMENTS) if equations.constant else limit
+    if not certify(progress, make_points(progress, steps), limit) and not progress.failure:
+        progress.failure = "give a better first guess in u, or more iterations"
+    return progress
 
-    # ``point`` is the present u, ``best`` the one with the smallest certificate; while conditions
-    # are still to be met (``left``) no certificate is finite, and the last point is the best.
-    while progress.best.certificate.worst > steps.settings.tolerance:
-        if point.broken:
-            progress.failure = NO_STEP if progress.steps else NOT_A_NUMBER
-            return progress
-        if progress.steps == limit:
-            progress.failure = "give a better first guess in u, or more iterations"
-            return progress
+
+def make_points(progress: Progress, steps: LinearSteps) -> Iterator[Judged]:
+    """Yield the u of one step after another, judged. Collective.
+
+    Args:
+        progress: has the first u, and gets the reason where there is no further step.
+        steps: solves linear problems.
+    """
+    point = progress.best
+    while not point.broken:
         left = take_step(progress, point, steps)
         progress.doubted = bool(steps.failed)
         if left is None:
-            return progress
-        point = Judged(equations, lower, upper, left)
-        progress.steps += 1
-        is_better = point.certificate.worst < progress.best.certificate.worst
-        if is_better or progress.best.left:
-            progress.best = point
-    return progress
+            return
+        point = Judged(point.equations, point.lower, point.upper, left)
+        yield point
+    progress.failure = NO_STEP if progress.count else NOT_A_NUMBER
 
 
 def take_step(progress: Progress, point: Judged, steps: LinearSteps) -> float | None:
@@ -213,62 +218,23 @@ def take_step(progress: Progress, point: Judged, steps: LinearSteps) -> float | 
     """
     # Where all methods have failed before, the tangents are not positive: a reduced step costs one
     # factor.
-    ways = [take_linear_step, take_reduced_step]
+    is_linear = point.equations.constant
+    ways = [steps.solve] if is_linear else [steps.solve, find_reduced_step]
     if not steps.helps:
         ways.reverse()
-    if point.equations.constant:
-        ways = [take_linear_step]
-    for take in ways:
-        left = take(progress, point, steps)
+    for find in ways:
+        progress.failure = UNHELD if is_linear else NO_STEP
+        try:
+            x, iterations, progress.method = find(point)
+        except StepFailure as failure:
+            log.debug("vi.solve: %s", failure)
+            continue
+        progress.inner += iterations
+        left = advance(point, x)
         if left is not None:
             progress.failure = ""
             return left
     return None
-
-
-def take_linear_step(progress: Progress, point: Judged, steps: LinearSteps) -> float | None:
-    """Go towards the answer of the linear problem between the bounds. Collective.
-
-    Args:
-        progress: gets the reason where it fails.
-        point: where the step begins.
-        steps: solves linear problems.
-
-    Returns:
-        The share of the change of held unknowns that is then left; None where it fails.
-    """
-    try:
-        x, iterations, progress.method = steps.solve(point)
-    except StepFailure as failure:
-        progress.failure = UNHELD if point.equations.constant else NO_STEP
-        log.debug("vi.solve: %s", failure)
-        return None
-    progress.inner += iterations
-    progress.failure = NO_STEP
-    return advance(point, x)
-
-
-def take_reduced_step(progress: Progress, point: Judged, steps: LinearSteps) -> float | None:
-    """Take a reduced step. Collective.
-
-    Args:
-        progress: gets the reason where it fails.
-        point: where the step begins.
-        steps: solves linear problems.
-
-    Returns:
-        The share of the change of held unknowns that is then left; None where it fails.
-    """
-    progress.failure = NO_STEP
-    try:
-        left = advance(point, find_reduced_step(point))
-    except StepFailure as failure:
-        log.debug("vi.solve: %s", failure)
-        return None
-    if left is not None:
-        progress.inner += 1
-        progress.method = "reduced step"
-    return left
 
 
 def advance(point: Judged, target: Array) -> float | None:

@@ -246,7 +246,7 @@ class Problem:
         descent = self._descend(low, high, iterations)
         if descent.failure:
             return progress, is_hill
-        descent.steps += progress.steps
+        descent.count += progress.count
         descent.inner += progress.inner
         return descent, False
 
@@ -276,7 +276,7 @@ class Problem:
         """
         steps = "steps downhill" if progress.method == METHOD else "Newton steps"
         worst = progress.best.certificate.worst
-        reason = f"the certificate is {worst:.1e} after {progress.steps} {steps}"
+        reason = f"the certificate is {worst:.1e} after {progress.count} {steps}"
         if progress.failure:
             cause = NEGATIVE if is_hill else progress.failure
             sentence = f"vi.solve: {reason}, above {self._tolerance:g}: {cause}"
@@ -312,7 +312,7 @@ def finish(
         lambda_upper=lambda_upper,
         active=(on_lower, on_upper),
         certificate=best.certificate,
-        iterations=progress.steps,
+        iterations=progress.count,
         inner=progress.inner,
         method=progress.method,
         reason=reason,

@@ -12,11 +12,12 @@ import numpy as np
 import ufl
 
 from ...core.algebra import Array, Matrix, total
-from ...core.checks import instance, on_all
+from ...core.checks import on_all
 from ...core.errors import InputError
 from .. import compat
 from ..matrices.petsc_algebra import PetscAlgebra
 from ..matrices.petsc_rows import transfer
+from .form_checks import form_of
 from .space import FemSpace
 
 NAME = "Forms: internal"
@@ -49,14 +50,8 @@ class InternalForms:
         self._space = space
         self._u = compat.function(space.V)
         v = ufl.TestFunction(space.V)
-        force = _ask(space, NAME, lambda: internal(self._u, v))
-        stored = _ask(space, "Forms: energy", lambda: energy(self._u))
-        if len(on_all(space.comm, NAME, force.arguments)) != 1:
-            raise InputError(
-                f"{NAME} is not linear in v alone; return an integral such as P:grad v"
-            )
-        if on_all(space.comm, "Forms: energy", stored.arguments):
-            raise InputError("Forms: energy holds a test function; return a functional of u")
+        force = form_of(NAME, lambda v: internal(self._u, v), space, v)
+        stored = form_of("Forms: energy", lambda: energy(self._u), space)
         du = ufl.TrialFunction(space.V)
         slope = on_all(space.comm, NAME, lambda: ufl.derivative(force, self._u, du))
         self._force = on_all(space.comm, NAME, lambda: space.compile_form(force))
@@ -90,22 +85,6 @@ class InternalForms:
         part = self._space.elimination.reduce(full)
         full.destroy()
         return self._algebra.store(transfer(part, self._algebra.comm.mpi))
-
-
-def _ask(space: FemSpace, owner: str, call: Callable[[], Any]) -> Any:
-    """Return the form that a function of the user's makes. Collective.
-
-    Args:
-        space: the body's unknowns.
-        owner: who asks, the beginning of messages.
-        call: makes it.
-
-    Raises:
-        InputError: it makes no form.
-    """
-    form = on_all(space.comm, owner, call)
-    instance(owner, "what it returns", form, ufl.Form, "return an integral, such as W(u) * ufl.dx")
-    return form
 
 
 def find_reference(space: FemSpace, internal: Callable[[Any, Any], Any]) -> Callable[..., Any]:

@@ -201,11 +201,9 @@ class PreparedVolume:
     def renew(self) -> None:
         """Take the entries of A again, which have changed in place. Collective.
 
-        Its pattern is the same, and there are no springs.
+        Its pattern is the same, and there are no springs and no friction.
         """
         self._scaled.renew()
-        if self._friction is not None:
-            self.close()
         if self._driver is not None:
             self._driver.renew()
 
