@@ -4,8 +4,9 @@
     python3 benchmarks/walk_step.py [--tree PATH] [--json FILE] [--figure FILE]
 
 The body is the wall of the first example of README.md, shaken against ground on its right side.
-The step is the one after the first with a closed point, so that all factors are made. Every call of a function of the package is traced by ``sys.setprofile`` as in ``walk.py``,
-which says what a *visit* and a *return* are. A call belongs
+The step is the one after the first with a closed point, so that all factors are made. Every call of
+a function of the package is traced by ``sys.setprofile`` as in ``walk.py``, which says what a
+*visit* and a *return* are. A call belongs
 
 - to the walk of dt, when it is handed the length of the step: a number equal to it;
 - to the walk of x, when it is handed the unknown of the step or its increment: the array itself, or
@@ -28,7 +29,7 @@ from types import FrameType
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from walk import COMPREHENSIONS, counts  # noqa: E402
+from walk import COMPREHENSIONS, counts
 
 HERE = Path(__file__).resolve().parent
 BEFORE = HERE / "walk_step_0.2.0.json"
