@@ -2,9 +2,9 @@
 """Run the peers of this folder, one process a row, and print the comparison.
 
 `bash benchmarks/peers/run.sh` calls it. The first command runs the peers with its own interpreter;
-the second prints the table of stored rows, which --json FILE stores as one file; the third puts stored rows in the
-place of those of the same programs in results.json; the last prints the tables of the page from
-results.json.
+the second prints the table of stored rows, which --json FILE stores as one file; the third puts
+stored rows in the place of those of the same programs in results.json; the last prints the tables
+of the page from results.json.
 
     python3 benchmarks/peers/compare.py NAME…
     python3 benchmarks/peers/compare.py --join FILE…
