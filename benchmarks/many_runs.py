@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Measure what a step costs when several runs are marched together, in steps of a run alone.
 
-    python3 benchmarks/many_runs.py [--sizes 2e3] [--rounds 5] [--json FILE]
+    python3 benchmarks/many_runs.py [--sizes 2e3] [--rounds 5] [--json FILE] [--group-of-one]
 
 The model is the wall of step_cost.py with its whole right side in possible contact. Harmonic
 motions of different amplitude and frequency shake it. ``march_many`` of k runs is timed beside k
@@ -9,6 +9,9 @@ times ``march``, in turn. ``cost_ratio`` is the processor time per run and step 
 runs, the median of the rounds. Set-up is in neither time, and nobody reads the reports.
 ``worst_difference`` compares a step with the single step that begins with the same state: the
 largest difference in u and v over their largest entries.
+
+With --group-of-one a run alone steps as a group of one, on rows (1, n), and only such rows are
+printed: ``cost_ratio`` is then what the other way to make a step costs where there is one run.
 """
 
 from __future__ import annotations
@@ -18,7 +21,7 @@ import json
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -32,6 +35,7 @@ from mpi4py import MPI  # noqa: E402
 
 import vi_contact as vc  # noqa: E402
 from demos.parts.problems.wall import Wall, build  # noqa: E402
+from vi_contact.run import together as groups  # noqa: E402
 
 SCHEME = vc.ZienkiewiczWoodTaylor(phi=0.5)
 SIZES = (216, 2e3, 2e4)
@@ -74,12 +78,12 @@ def seconds_per_step(loop: Iterator[Any], count: int) -> float:
     return (time.thread_time() - begin) / steps
 
 
-def measured(size: float, rounds: int) -> list[dict[str, Any]]:
+def measured(size: float, rounds: int, counts: Sequence[int] = RUNS) -> list[dict[str, Any]]:
     """Return the rows of one size, one for each number of runs."""
-    every, dt = problems(size, max(RUNS))
+    every, dt = problems(size, max(counts))
     steps = round(min(max(4.8e5 / size, 12.0), 200.0))
     rows = []
-    for count in RUNS:
+    for count in counts:
         chosen = every[:count]
         ways: dict[str, Callable[[], list[Iterator[Any]]]] = {
             "alone": lambda chosen=chosen: [
@@ -143,12 +147,19 @@ def main() -> None:
     )
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--json", type=Path, help="write the rows into this file")
+    parser.add_argument(
+        "--group-of-one", action="store_true", help="step a run alone as a group of one"
+    )
     options = parser.parse_args()
+    counts = RUNS
+    if options.group_of_one:
+        groups.FEWEST = 1
+        counts = (1,)
     print(
         f"{'unknowns':>8} {'runs':>5} {'us/run + step':>14} {'alone us':>10} {'ratio':>6} "
         f"{'difference':>11}"
     )
-    rows = [row for size in options.sizes for row in measured(size, options.rounds)]
+    rows = [row for size in options.sizes for row in measured(size, options.rounds, counts)]
     if options.json:
         options.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
 

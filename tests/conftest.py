@@ -48,6 +48,8 @@ WATCH_SECONDS = 30
 # patience of a rank that has failed: the others are probably waiting for it in a collective call
 MEETING_SECONDS = 30
 SLOWEST_FILES = 10  # told at the end of a run
+# What --quick leaves out: whole programs, pages, pictures and comparisons with what is published.
+WHOLE = ("benchmarks", "house", "plots", "validation", "validation_book")
 
 _stderr = pytest.StashKey[TextIO]()
 _watched = pytest.StashKey[float]()
@@ -91,8 +93,17 @@ def _abort(config: pytest.Config, message: str) -> None:
     _comm().Abort(1)
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--quick",
+        action="store_true",
+        help="run one case of each test that is not long or slow, without " + ", ".join(WHOLE),
+    )
+
+
 @pytest.hookimpl(trylast=True)
 def pytest_configure(config: pytest.Config) -> None:
+    os.fsync = _leave_to_the_system  # type: ignore[assignment]
     # the real one: pytest captures fd 2 during tests
     config.stash[_stderr] = os.fdopen(os.dup(2), "w")
     if RANK:  # rank 0 speaks for all
@@ -107,6 +118,11 @@ def pytest_configure(config: pytest.Config) -> None:
         config.args[:] = sorted(named, reverse=True)
 
 
+def _leave_to_the_system(descriptor: int) -> None:
+    """In the place of os.fsync: what tests write need not outlast a power cut, and each file waits
+    for the disk as long as ten steps take. A process that is killed loses nothing by it."""
+
+
 def _second_half(config: pytest.Config) -> bool:
     """Whether this is every other process of several: those begin to collect from behind. In a
     fresh tree asserts are rewritten, which takes longer than to import, and so the processes meet
@@ -114,9 +130,11 @@ def _second_half(config: pytest.Config) -> bool:
     return bool(int(getattr(config, "workerinput", {}).get("workerid", "gw0")[2:]) % 2)
 
 
-def pytest_ignore_collect(collection_path: Path) -> bool | None:
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
     """Files that are left out as a whole are not even imported: that takes longer than many of
     their tests."""
+    if config.getoption("--quick") and collection_path.parent.name in WHOLE:
+        return True
     if SIZE == 1 or collection_path.suffix != ".py":
         return None
     if SIZE > 2 and collection_path.parent.name in ABOVE:
@@ -206,6 +224,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     kept = (
         _paired(items) if SIZE == 1 else _covering([item for item in items if not _left_out(item)])
     )
+    if config.getoption("--quick"):
+        kept &= _first_cases(items)
     if left_out := [item for item in items if item not in kept]:
         items[:] = [item for item in items if item in kept]
         config.hook.pytest_deselected(items=left_out)
@@ -213,6 +233,15 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if SIZE == 1:
         slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
         items.sort(key=lambda item: -slow[item.path] - 10 * ("validation" in item.path.parts))
+
+
+def _first_cases(items: list[pytest.Item]) -> set[pytest.Item]:
+    """The first case of each test function that --quick runs."""
+    functions: dict[str, pytest.Item] = {}
+    for item in items:
+        if not any(map(item.get_closest_marker, ("slow", "long"))):
+            functions.setdefault(item.nodeid.split("[")[0], item)
+    return set(functions.values())
 
 
 def pytest_collectreport(report: pytest.CollectReport) -> None:

@@ -2,11 +2,13 @@
 """Run the peers of this folder, one process a row, and print the comparison.
 
 `bash benchmarks/peers/run.sh` calls it. The first command runs the peers with its own interpreter;
-the second prints the table of stored rows, which --json FILE stores as one file; the third prints
-the tables of the page from results.json.
+the second prints the table of stored rows, which --json FILE stores as one file; the third puts
+stored rows in the place of those of the same programs in results.json; the last prints the tables
+of the page from results.json.
 
     python3 benchmarks/peers/compare.py NAME…
     python3 benchmarks/peers/compare.py --join FILE…
+    python3 benchmarks/peers/compare.py --renew FILE…
     python3 benchmarks/peers/compare.py --page PAGE
 """
 
@@ -260,10 +262,38 @@ def summary(about: dict[str, Any], rows: list[dict[str, Any]]) -> str:
     lines = [
         f"The run of {about['date']}: {cpu}, {about['cores']} cores, load {about['load']} at the "
         f"end, {about['system']}, Python {about['python']}, numpy {about['numpy']}.",
+        *(f"{peers} ran again: {when}." for peers, when in about.get("renewed", {}).items()),
         "",
     ]
     versions = dict.fromkeys((row["peer"], row.get("version", "not installed")) for row in rows)
     return "\n".join([*lines, *(f"- {peer} {version}" for peer, version in versions)])
+
+
+def renew(stored: dict[str, Any], files: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return a stored run in which programs have the rows of later runs, told with their dates.
+
+    Lines of code are counted anew in all rows.
+    """
+    rows = list(stored["rows"])
+    dates: dict[str, str] = {}
+    for file in files:
+        names = {row["name"] for row in file["rows"]}
+        place = next(number for number, row in enumerate(rows) if row["name"] in names)
+        rows = [row for row in rows if row["name"] not in names]
+        rows[place:place] = file["rows"]
+        peers = " and ".join(dict.fromkeys(row["peer"] for row in file["rows"]))
+        dates[peers] = f"{file['about']['date']}, {file['about']['cpu']}"
+    for row in rows:
+        if "lines" in row:
+            row["lines"] = lines_of(path_of(row["name"]), row["problem"])
+    return {"about": stored["about"] | {"renewed": dates}, "rows": rows}
+
+
+def store(stored: dict[str, Any], path: Path) -> None:
+    """Write a run, a line for each row."""
+    text = ",\n".join(json.dumps(row) for row in stored["rows"])
+    about = json.dumps(stored["about"])
+    path.write_text(f'{{"about": {about},\n"rows": [\n{text}\n]}}\n', encoding="utf-8")
 
 
 def parts_of(stored: dict[str, Any]) -> dict[str, str]:
@@ -307,6 +337,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*")
     parser.add_argument("--join", nargs="*", help="join these files of rows; nothing is run")
+    parser.add_argument(
+        "--renew", nargs="+", help="take the rows of these files into results.json; nothing is run"
+    )
     parser.add_argument("--json", help="file for machine, date, versions and rows")
     parser.add_argument(
         "--page", help="page whose tables become those of results.json, without runs"
@@ -318,6 +351,11 @@ def main() -> None:
         page.write_text(
             renewed(page.read_text(encoding="utf-8"), parts_of(stored)), encoding="utf-8"
         )
+        return
+    if given.renew:
+        stored = json.loads((HERE / "results.json").read_text(encoding="utf-8"))
+        files = [json.loads(Path(file).read_text(encoding="utf-8")) for file in given.renew]
+        store(renew(stored, files), HERE / "results.json")
         return
     about = machine()
     if given.join is None:
@@ -332,10 +370,7 @@ def main() -> None:
     for problem in PROBLEMS:
         print(f"\n{problem}\n\n{table(rows, problem)}")
     if given.json:
-        text = ",\n".join(json.dumps(row) for row in rows)
-        Path(given.json).write_text(
-            f'{{"about": {json.dumps(about)},\n"rows": [\n{text}\n]}}\n', encoding="utf-8"
-        )
+        store({"about": about, "rows": rows}, Path(given.json))
 
 
 if __name__ == "__main__":

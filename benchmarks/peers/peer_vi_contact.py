@@ -11,6 +11,15 @@ from problems import BAR, SIGNORINI, THROWN
 import vi_contact as vc
 from vi_contact import fem
 
+# Names are imported when they are first asked for, and the time of a row is without imports.
+IMPORTED = (
+    *(vc.LinearElastic, vc.PlaneStrain, vc.HalfSpace, vc.ContactProblem, vc.Condensed),
+    *(vc.ContactStabilisedNewmark, vc.Energy, vc.Contact),
+    *(vc.simulate, vc.static_equilibrium),
+    *(fem.Facets, fem.Traction, fem.Prescribed, fem.BodyForce),
+    *(fem.assemble, fem.contact_surface, fem.as_function),
+)
+
 TITLE = "vi_contact"
 INSTALL = {"system": []}
 WAYS = {

@@ -103,6 +103,7 @@ def test_reference_rows(runs: dict[tuple[float, str], BeamRun], case: tuple[floa
     assert found.energy[0] == pytest.approx(125.0 / 6.0 + 100.0 * 5.0 / (2.0 * 200.0**2), rel=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.promise("theory/beam.md", "energy balance below closes to 3e-9 J", bound="1e-8 J")
 @pytest.mark.promise("theory/beam.md", "This holds within 3.3e-9 J", bound="1e-8 J")
 @pytest.mark.promise("theory/beam.md", "takes 65 % and 42 % of the energy")

@@ -32,6 +32,7 @@ def counts(cell: str) -> tuple[int, ...]:
     return tuple(map(int, cell.split(", ")))
 
 
+@pytest.mark.long
 def test_the_table_is_what_the_runs_give(printed: dict[tuple[str, float], list[str]]) -> None:
     """1000 elements and steps: counts, largest force, losses and their ratio, each as printed."""
     assert set(printed) == {(reading, a2) for reading in "ABC" for a2 in (0.001, 2.0)}

@@ -87,6 +87,7 @@ def test_convergence_as_eps_vanishes() -> None:
     assert np.all(np.abs(orders - 1.0) < 0.12) and errors[-1][0] < 1e-4
 
 
+@pytest.mark.long
 @pytest.mark.promise("theory/beam.md", "which is order 1")
 def test_rate_dependent_friction() -> None:
     """mu = |rate|/100: of the old step in Algorithm 10, of the step itself in SlipRateCoulomb;
@@ -104,6 +105,7 @@ def test_rate_dependent_friction() -> None:
     assert apart[0] < 0.01 and apart[0] / apart[1] == pytest.approx(2.0, rel=0.05)
 
 
+@pytest.mark.long
 @pytest.mark.promise(
     "theory/beam.md", "the error falls with order 0.6 to 0.8", bound="0.003, order 0.4 to 0.95"
 )
@@ -140,6 +142,7 @@ def test_rod_ledger() -> None:
     assert np.abs(history["energy_defect"]).max() <= 2.0 * rounded(problem, 0.5)
 
 
+@pytest.mark.long
 @pytest.mark.promise("theory/beam.md", "The static contact force is right to 1e-3 N")
 def test_rod_comes_to_rest() -> None:
     """Kelvin-Voigt, V9.1's scheme: the mean contact force tends to end force + half the body force
@@ -174,6 +177,7 @@ def rubbing() -> tuple[Array, Array, Array, float]:
     return histories(problem, 0.005, 400)
 
 
+@pytest.mark.long
 @pytest.mark.promise("theory/beam.md", "the results agree within 1e-11 m", bound="1e-10 m")
 def test_the_rod_drives_the_friction(rubbing: tuple[Array, Array, Array, float]) -> None:
     """One problem for both gives what rod first, beam second gives; regularised: order 1 in eps."""

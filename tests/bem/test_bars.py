@@ -22,6 +22,7 @@ pytestmark = pytest.mark.serial
 STIFF = vc.LinearElastic.from_wave_speeds(2.0, 1.0, 1.0)
 
 
+@pytest.mark.long
 def test_a_rod_on_a_stiffer_rod():
     """B8: c_P = 1 on c_P = 2, fixed at its base, rollers, a step until t = 5: pressures of the
     interface from the characteristics, 4/3, 20/9, 40/27 and 8/81 in a unit of time each, impulse

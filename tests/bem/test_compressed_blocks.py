@@ -71,6 +71,7 @@ def expanded(short: CompressedBlocks) -> EnergeticBlocks:
     return EnergeticBlocks(short.mesh, short.c_p, short.c_s, short.dt, *matrices)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.promise("theory/bem.md", "it bounds every entry of V, K and D")
 def test_blocks(shape):
@@ -89,6 +90,7 @@ def test_blocks(shape):
         assert difference < 2e-9 * scale, name
 
 
+@pytest.mark.long
 def test_tails_are_short():
     """Fifteen steps or so hold any tail; their number hardly grows with the length of the tail."""
     counts = [
@@ -172,6 +174,7 @@ def test_contact():
     assert np.abs(runs[0] - runs[1]).max() < 1e-7 * np.abs(runs[0]).max()
 
 
+@pytest.mark.long
 def test_threads():
     """Answers do not depend on the number of threads, to the last digit."""
     one, two = both("disk"), both("disk", threads=2)
@@ -181,6 +184,7 @@ def test_threads():
         assert np.array_equal(ours.values, theirs.values)
 
 
+@pytest.mark.long
 def test_long_tails_of_a_small_body():
     """Many steps behind the last wave: at most of them nothing new is integrated."""
     mesh = polygon(SQUARE, 0.5)
@@ -194,6 +198,7 @@ def test_long_tails_of_a_small_body():
     assert sum(part.values.size for part in short.stretches) < 0.3 * 28 * 100 * len(mesh) ** 2
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("symmetric", [True, False])
 def test_long_runs(symmetric, monkeypatch):
     """Motions of many steps are those of the march; blocks cut off at the last step are wrong and
@@ -225,6 +230,7 @@ def test_long_runs(symmetric, monkeypatch):
             BoundaryProblem(PoincareSteklov(cut, RHO, False), pull).solve()
 
 
+@pytest.mark.long
 def test_rounding_moves_a_free_body(monkeypatch):
     """Where rounding of second differences outgrows the momentum of a free body, a sentence; held
     bodies go on."""

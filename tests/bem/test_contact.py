@@ -232,6 +232,7 @@ def rod(elements: int, steps: int, *, load: float = 1.0, pulse: float = 99.0) ->
     )
 
 
+@pytest.mark.long
 def test_impact_with_a_gap():
     """A rod driven by a unit pulse of length 1 crosses a gap of 0.27, rebounds with its speed:
     impulse 2, order 1."""
@@ -268,6 +269,7 @@ def test_two_bodies_that_are_mirror_images():
     )
 
 
+@pytest.mark.long
 @pytest.mark.promise("theory/bem.md", "Two welded halves move like one square to 1 %")
 def test_a_weld_is_no_cut():
     """B8: two halves welded move together at the weld, to round-off, and like one body of their

@@ -138,6 +138,7 @@ def test_table_of_radial_functions(operators):
             assert np.abs(a - b).max() < 1e-10 * np.abs(b).max(), (s, which)
 
 
+@pytest.mark.long
 def test_rod_under_a_smooth_load(operators):
     """B11: top displacement, 10 elements a side; order from 5 to 10."""
     errors = [top_error(operators[k], smooth_load, smooth_integral) for k in (5, 10)]
@@ -166,6 +167,7 @@ def test_rod_under_a_step(operators):
     assert motion.work.min() > 0.0 and 1.8 < motion.work[19] < 2.02
 
 
+@pytest.mark.long
 def test_small_steps_stay_bounded():
     """B11: the rod (top exactly 1 at most) with |s| h/c_S up to 100; fewer points on touching
     elements give 250."""
@@ -191,6 +193,7 @@ def test_plane_pulses(operators, shear):
     assert errors[1] < 0.03 and np.log2(errors[0] / errors[1]) > 2.0
 
 
+@pytest.mark.long
 @pytest.mark.promise("theory/bem.md", "Radau differ by 4.7e-3 at k = 10", bound="5e-3")
 def test_energetic_and_convolution_agree(operators):
     """B11: top of the rod under the smooth load, Radau against energetic, 10 elements a side."""
@@ -270,6 +273,7 @@ def test_prescribed_motion(operators):
     assert forces[1] < 1.6e-2 and np.log2(forces[0] / forces[1]) > 1.3
 
 
+@pytest.mark.long
 def test_density_and_the_unsymmetric_form(operators):
     """Twice the density at the same speeds halves the compliance; the unsymmetric form converges to
     the same rod."""

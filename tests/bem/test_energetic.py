@@ -39,6 +39,7 @@ def blocks() -> dict[int, EnergeticBlocks]:
     }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("symmetric", [True, False])
 @pytest.mark.parametrize(("shear", "fine"), [(False, 1.4e-2), (True, 1.6e-2)])
 def test_plane_pulses(blocks, symmetric, shear, fine):
@@ -91,6 +92,7 @@ def echoes(t: np.ndarray, integral) -> np.ndarray:
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("symmetric", [True, False])
 def test_rod_under_a_step(blocks, symmetric):
     """B5: top displacement to 1 %, the reaction of the base (exactly 0 or 2) never above 2.05; work

@@ -58,6 +58,7 @@ def test_slow_warming_expands_a_square():
     assert np.abs(u - exact).max() < 2e-5 * exact.max()  # 5.7e-6
 
 
+@pytest.mark.long
 def test_warming_in_time_is_that_of_finite_elements():
     """A square on a rigid base under a smooth warming: its corner in three crossings, beside 20 x
     20 finite elements with an ``InitialStrain``. Both together are 1.8 % apart; 20 elements a side

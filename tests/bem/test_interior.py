@@ -23,6 +23,7 @@ pytestmark = pytest.mark.serial
 POINTS = np.array([(0.0, 0.0), (0.3, -0.2), (-0.41, 0.43), (0.1, 0.49)])
 
 
+@pytest.mark.long
 @pytest.mark.promise("theory/bem.md", "It is of order 2 up to a tenth of an element")
 def test_pulse_crosses_the_square():
     """B4: order 2 at points inside, one of them a tenth of an element from the boundary."""

@@ -282,6 +282,7 @@ def test_an_obstacle_that_moves():
     assert middle(1.0) == pytest.approx(2.0 * (1.0 - 1.5 / K), rel=1e-14) and end(0.7) == 0.7**2
 
 
+@pytest.mark.long
 def test_the_benchmark(tmp_path):
     """benchmarks/bem_multiplier.py, small: means swing where ends do not, the constants are good in
     both; H = h takes Uzawa's method more iterations; its picture."""

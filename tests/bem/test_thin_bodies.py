@@ -131,6 +131,7 @@ def error(displacement: np.ndarray, times: np.ndarray, mesh: BoundaryMesh) -> fl
     return float(np.linalg.norm(top - exact) / np.linalg.norm(np.broadcast_to(exact, top.shape)))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("share", [5, 20])
 def test_thin_rod(share):
     """A rod of h/5 and h/20 between rollers against the exact one: the error is that of the time

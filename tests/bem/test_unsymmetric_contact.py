@@ -75,6 +75,7 @@ def differences(k: int, law: str) -> tuple[float, float]:
     ).max() / first.max()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.promise("theory/bem.md", "Certificates of the unsymmetric steps", bound="1e-13")
 def test_both_forms_meet(law):
@@ -99,6 +100,7 @@ def test_both_forms_meet(law):
     assert (np.diff(found.friction_loss, prepend=0.0) >= -1e-14).all()
 
 
+@pytest.mark.long
 def test_the_sharp_triangle():
     """benchmarks/bem_forms.py, elements twice as long: both forms follow plane pulses, the
     symmetric one is positive and the other one is not."""
@@ -268,6 +270,7 @@ def concrete(steps: int, form: str, fixed: bool) -> BoundaryProblem:
     return replace(given, operator=operator, fixed=held, forces=given.forces[:steps])
 
 
+@pytest.mark.long
 def test_growth_of_rounding_errors_is_refused():
     """B16: with c_P dt = 4 h the unsymmetric form multiplies what unit forces move by 1e18 in 160
     steps, and rounding with it: contact forces were 28 times too large, each step certified.

@@ -180,6 +180,7 @@ def test_closed_streams_are_no_hindrance(folder: Path, tmp_path: Path, closed: s
     assert status == 1 and "Error" not in said
 
 
+@pytest.mark.long
 def test_a_reader_that_has_gone_is_no_error(folder: Path, tmp_path: Path) -> None:
     """As of "| head -1": what was to be done is done, quietly; where standard output is the file to
     write, the status is 128 + SIGPIPE, as shells have it."""
@@ -192,6 +193,7 @@ def test_a_reader_that_has_gone_is_no_error(folder: Path, tmp_path: Path) -> Non
     assert shell(line)[1:] == ("141\n", "")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "words",
     [

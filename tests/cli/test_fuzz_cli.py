@@ -402,6 +402,7 @@ def check(
     return tried
 
 
+@pytest.mark.long
 @pytest.mark.fuzz
 def test_wrong_command_lines(check: Callable[[list[str]], None], tmp_path: Path) -> None:
     FUZZ.each(COUNT, chosen, check)

@@ -46,6 +46,7 @@ def said(capsys, *arguments):
     return capsys.readouterr().out
 
 
+@pytest.mark.long
 def test_info_after_processing(packet, capsys):
     rows = said(capsys, "info", "packet.at2", "--scale", "2", "--resample", "0.005").splitlines()
     values = {row[:20].strip(): row[20:] for row in rows}

@@ -32,6 +32,7 @@ raise SystemExit(status)
 """
 
 
+@pytest.mark.long
 def test_the_wall_starts_without_what_it_has_no_use_for(tmp_path: Path) -> None:
     pytest.importorskip("dolfinx")
     ended = subprocess.run(

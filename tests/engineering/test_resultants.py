@@ -269,6 +269,7 @@ def resting() -> dict[str, Array]:
     return oscillator()
 
 
+@pytest.mark.long
 def test_transfer_function_of_an_oscillator(resting: dict[str, Array]) -> None:
     """|absolute/ground| = sqrt(1 + (2 z r)²)/sqrt((1 - r²)² + (2 z r)²): 1 % up to twice its
     frequency, 10.05 at it."""

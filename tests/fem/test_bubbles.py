@@ -344,6 +344,7 @@ def test_mass_of_rigid_motions_is_kept() -> None:
     )
 
 
+@pytest.mark.long
 def test_two_thrown_blocks_keep_momentum_and_energy() -> None:
     both = blocks(3, upper=(3, 3, 3), lower=(3, 3, 3), simplices=True, gap=0.01)
     mesh, tags = fem.build_mesh(both, COMM)

@@ -212,6 +212,7 @@ Physical Curve("base") = {1}; Physical Curve("ground") = {16}; Physical Curve("r
 """
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_case_files_are_refused_and_may_mean_hinges(tmp_path):
     """The two corner points that a block and its ground are drawn between; hinges = true in the

@@ -54,6 +54,7 @@ def test_the_forms_at_rest_are_those_of_the_linear_body(comm: Any) -> None:
         assert off <= 1e-5 * size
 
 
+@pytest.mark.long
 def test_a_block_is_thrown_with_friction(comm: Any) -> None:
     """Certificates of the nonlinear step, the ledger with W(u), and a loss of the scheme that is
     small beside the energy."""
@@ -128,6 +129,7 @@ def test_a_barrel_is_pressed(comm: Any, stages: tuple[float, ...]) -> None:
     assert np.abs(ours - theirs).max(initial=0.0) <= 1e-8
 
 
+@pytest.mark.long
 def test_the_ranks_do_not_change_the_answer(comm: Any) -> None:
     """Thrown with friction, to 1e-10 of the displacements."""
     ends = []
@@ -189,6 +191,7 @@ def test_released_supports_leave_their_reactions(comm: Any) -> None:
     assert off <= 1e-9 * size
 
 
+@pytest.mark.long
 @pytest.mark.two_ranks
 @pytest.mark.promise("guide/nonlinear.md", "keeps 99 % of its energy over five turns", bound="0.99")
 def test_a_block_spins(comm: Any) -> None:

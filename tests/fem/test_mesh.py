@@ -34,6 +34,7 @@ def test_wall_and_its_sides_have_their_exact_sizes(options, comm):
     assert isinstance(tags["base"], fem.Facets) and tags["base"].name == "base"
 
 
+@pytest.mark.long
 def test_a_script_of_gmsh_is_meshed_refined_and_cut(comm, shared_tmp):
     """C1.2: two bodies that share an edge, from a .geo, cut open along it: sizes, and four times
     the cells."""

@@ -32,6 +32,7 @@ WIDE, LONG, HIGH = 4.0, 2.0, 0.5  # lengths of lower and upper block, height of 
 SAME = 1e-7  # of the weight: certificates are below 1e-9
 
 
+@pytest.mark.long
 @Fuzz("pairs", __file__).property(
     upper=st.integers(1, 7),
     lower=st.integers(1, 9),

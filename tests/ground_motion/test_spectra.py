@@ -120,6 +120,7 @@ def test_harmonic_at_resonance(per_period, zeta):
     )
 
 
+@pytest.mark.long
 def test_limits_of_the_period():
     """T to 0: the oscillator rides on the ground, PSA = SA = PGA; T to infinity: it stays behind,
     SD = PGD."""

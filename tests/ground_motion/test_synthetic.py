@@ -94,6 +94,7 @@ def test_kanai_tajimi_density_at_marked_frequencies():
     )
 
 
+@pytest.mark.long
 def test_kanai_tajimi_variance():
     """pi S0 omega_g (1 + 4 zeta²) / (2 zeta): the integral, and the mean square of a long
     motion."""

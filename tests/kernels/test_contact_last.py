@@ -236,6 +236,7 @@ def test_another_library_is_another_file(small: Path, tmp_path: Path) -> None:
     assert len({beside, first, compiler.compile_library([small], [], beside)}) == 3
 
 
+@pytest.mark.long
 def test_processes_that_compile_at_once_do_not_meet(small: Path, cold: Path) -> None:
     """Both find it missing, both make it, one file is left, and each has loaded a whole one."""
     script = (

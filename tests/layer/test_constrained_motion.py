@@ -175,6 +175,7 @@ def test_rigid_body_impact_map():
     assert BODY.kinetic_energy(after) == pytest.approx(0.836017564, abs=5.1e-10)
 
 
+@pytest.mark.long
 def test_rigid_body_through_the_layer():
     """V5.2: the motion tends to the impact map like b; momenta along the boundary do not change."""
     errors = [float(np.max(np.abs(thrown(width).v[-1] - AFTER))) for width in (1e-4, 1e-6)]
@@ -187,6 +188,7 @@ def test_rigid_body_through_the_layer():
     assert change - A * change[2] == pytest.approx(np.zeros(6), abs=3e-6)
 
 
+@pytest.mark.long
 def test_an_ellipsoid_turns_and_bounces():
     """Support point, gradient and its rate of an ellipsoid: A is d rho along the motion; energy in
     flight."""
@@ -282,6 +284,7 @@ def test_slider_returns_to_its_line():
     assert np.max(np.abs(held.q)) < 1e-14
 
 
+@pytest.mark.long
 @pytest.mark.promise(
     "theory/boundary_layer.md", "from that of the rod by 2.2e-4", bound="3e-4, falling with b"
 )

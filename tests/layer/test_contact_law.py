@@ -52,6 +52,7 @@ def stiff(e: float, metric: Metric, *, dt: float, elements: int = 1, E: float = 
     return momentum / (10.0 * 10.0 * e)
 
 
+@pytest.mark.long
 @serial
 @pytest.mark.parametrize("metric", [Metric.BLENDED, Metric.FLAT])
 @pytest.mark.promise("theory/boundary_layer.md", "BLENDED is within 1e-4", bound="5e-3")
@@ -64,6 +65,7 @@ def test_rebound_of_a_stiff_body(metric):
     assert stiff(0.5, metric, dt=5e-4, elements=4, E=1e9) == pytest.approx(1.0, abs=5e-3)
 
 
+@pytest.mark.long
 @serial
 @pytest.mark.promise("theory/boundary_layer.md", "is of order 2 and exact in the energy")
 def test_order_two():
@@ -92,6 +94,7 @@ def layered_bar(
     )
 
 
+@pytest.mark.long
 @serial
 def test_bar_tends_to_the_exact_inequality():
     """V1.1: displacement of the foot to O(b), pressure 300, rebound 10 m/s; the gap stays open."""
@@ -117,6 +120,7 @@ def test_bar_tends_to_the_exact_inequality():
     assert errors[1] == pytest.approx(0.5 * errors[0], rel=0.1)
 
 
+@pytest.mark.long
 @serial
 def test_energy_of_potential_and_damper():
     """Without the metric: E + stored energy is constant for c = 0, and never grows otherwise, step

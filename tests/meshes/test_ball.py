@@ -110,6 +110,7 @@ def test_sizes_that_make_no_ball_are_refused(wrong, word):
         BallMesh(**{**SMALL, **wrong})
 
 
+@pytest.mark.long
 def test_half_ball_stands_on_its_anvil():
     """Half of the sphere's volume, its plane of symmetry and its lowest node; below it a block of 2
     L x L x L, all of whose sides are named, as finely meshed at the foot; two bodies."""

@@ -64,6 +64,7 @@ def area(arrays: Any) -> float:
     return float(0.5 * np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())
 
 
+@pytest.mark.long
 def test_a_wall_is_meshed(tmp_path: Path) -> None:
     """Area 4·0.5 + 0.5·5.5 m², and its groups."""
     path = written(tmp_path, WALL)
@@ -97,6 +98,7 @@ Physical Volume("body") = {out[1]}; Physical Surface("base") = {1};
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("cell", ["triangle", "quadrilateral", "tetrahedron", "hexahedron"])
 def test_all_cells_are_divided(tmp_path: Path, cell: str) -> None:
     """C1.2: 2^d times as many cells, 2^(d-1) facets, twice over; the measure of body and base to
@@ -209,6 +211,7 @@ def test_harmless_habits_are_left_out(tmp_path: Path, what: str) -> None:
     assert sorted(one.name for one in tmp_path.iterdir()) == ["wall.geo"]
 
 
+@pytest.mark.long
 def test_a_script_of_habits_has_the_mesh_of_the_script_without(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -289,6 +292,7 @@ def test_parameters_of_a_window_are_left_out(tmp_path: Path) -> None:
     assert script.text.count("\n") == (constant + PLAIN[6:]).count("\n") + 1
 
 
+@pytest.mark.long
 def test_numbers_are_given_to_what_a_script_does_not_set(tmp_path: Path) -> None:
     """As -setnumber of Gmsh: for a name that is not set, and in the place of a DefineConstant.
     Lengths to 1e-12."""
@@ -348,6 +352,7 @@ def test_what_does_not_end_is_ended(tmp_path: Path) -> None:
         arrays_of(GeoFile(path=path, time_limit=0.8))
 
 
+@pytest.mark.long
 def test_other_mistakes_are_told(tmp_path: Path) -> None:
     path = written(tmp_path, WALL)
     for given, said in (
@@ -394,6 +399,7 @@ def curved_area(arrays: Any) -> float:
     return total
 
 
+@pytest.mark.long
 def test_divided_cells_of_second_order_stay_curved(tmp_path: Path) -> None:
     """A disk of radius 1 m: the area is wrong by O(h⁴), a 16th after a division; 8 leaves room for
     the first mesh."""

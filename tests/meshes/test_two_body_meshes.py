@@ -379,6 +379,7 @@ dt = 0.01
 """
 
 
+@pytest.mark.long
 def test_a_case_file_cuts_between_two_cell_groups(tmp_path):
     """The weight of the dam, 2 m by 1 m, rests on its joint, which no line of the script names."""
     pytest.importorskip("dolfinx")

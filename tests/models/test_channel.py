@@ -56,6 +56,7 @@ def polygon_area(points, cells):
 # --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @serial
 @meshes
 def test_two_bodies_divided_alike(name):
@@ -400,6 +401,7 @@ def test_a_moved_bedrock(ends, hht):
     assert np.abs(found[0] - found[0][0]).max() > 0.1 * found[0].max()
 
 
+@pytest.mark.long
 @serial
 def test_a_vertical_record_ties_the_ends_of_the_case(tmp_path):
     """--motion H,V on the case that ships: rollers would hold what shakes upwards; one record
@@ -430,6 +432,7 @@ def test_a_vertical_record_ties_the_ends_of_the_case(tmp_path):
     assert not built_in(units[0], motion=f"{record}", dt=0.01).problem(COMM).system.space.tied.any()
 
 
+@pytest.mark.long
 @serial
 @pytest.mark.parametrize("ends", [TiedSides, FreeFieldSides])
 def test_waves_from_below(ends):

@@ -163,6 +163,7 @@ run(Path({out!r}), 10**6, checkpoint_every=10)
 """
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_kill_9(tmp_path: Path) -> None:
     """kill -9 in full flight: every row written is whole, the checkpoint is, and the run goes on to

@@ -235,6 +235,7 @@ PICTURES = (
 )
 
 
+@pytest.mark.long
 def test_reports_and_pictures_replace_links(
     comm: Any, tmp_path: Path, notes: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

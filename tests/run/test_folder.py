@@ -428,6 +428,7 @@ def test_damaged_histories_are_told(tmp_path: Path) -> None:
             read(tmp_path, 4)
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_long_histories_stay_on_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Beyond a number of bytes the memory lets go of rows; histories, facts and restart are the

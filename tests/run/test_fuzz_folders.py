@@ -293,6 +293,7 @@ def damage(folder: Path, dice: Dice) -> str:
     return path.name
 
 
+@pytest.mark.long
 @pytest.mark.fuzz
 def test_folders(sound: Path, tmp_path: Path) -> None:
     """100 of them: a restart gives the straight run, or one sentence, and no file is changed; so

@@ -167,6 +167,7 @@ FOLDERS, PICTURES = Fuzz("run folders", __file__), Fuzz("pictures of run folders
 FILES = ("history.csv", "columns.json", "summary.json", "history.h5")
 
 
+@pytest.mark.long
 @pytest.mark.fuzz
 def test_what_is_read_are_the_numbers_of_the_run(run: Path, tmp_path: Path) -> None:
     """Whatever was done to one file. A report on it may still be refused: on one row, or on a

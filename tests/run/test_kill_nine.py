@@ -12,6 +12,7 @@ from kill_nine import check
 pytestmark = pytest.mark.serial
 
 
+@pytest.mark.long
 @pytest.mark.skipif(shutil.which("mpirun") is None, reason="needs mpirun")
 def test_ranks_that_are_killed(tmp_path: Path) -> None:
     """Every row is on file or computed again, and in the end the histories are the straight run's

@@ -20,6 +20,7 @@ from vi_contact.run.stepper import Stepper, Trial
 ELEMENTS = 40
 
 
+@pytest.mark.long
 @pytest.mark.serial
 @pytest.mark.parametrize(
     "scheme",
@@ -88,6 +89,7 @@ def test_passes_and_tangents_are_few() -> None:
     assert sum(solver.counts) / 150 <= 12.0 and solver.tangents / 150 <= 3.0
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_a_restart_is_the_straight_run(tmp_path: Any) -> None:
     """To the last bit: nothing of a step is carried to the next but its state."""
@@ -111,6 +113,7 @@ def test_an_internal_force_that_is_none_is_refused() -> None:
         )
 
 
+@pytest.mark.long
 @pytest.mark.serial
 @pytest.mark.parametrize("law", [vc.Inelastic(), vc.Newton(0.5)], ids=repr)
 def test_impact_laws_act_on_a_chain_of_cubic_springs(law: Any) -> None:

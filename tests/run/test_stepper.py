@@ -91,6 +91,7 @@ def test_the_error_of_a_spring_is_held(relative: float) -> None:
     assert all(after.old.t == before.new.t for before, after in pairwise(reports))
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_steps_do_not_chatter_around_an_impact() -> None:
     """Only parts around impacts are as short as allowed, and every base step begins anew."""

@@ -446,6 +446,7 @@ def test_contact_work_of_the_thrown_bar_falls_with_halving():
     np.testing.assert_allclose(lost, 10.0 * dt * np.array([0.9, 0.15, 0.025]), rtol=1e-6)
 
 
+@pytest.mark.long
 @serial
 def test_means_over_arrival_times_of_the_thrown_bar():
     """The table in docs/guide/schemes.md: delay [dt] and work lost [J] of the first closure,

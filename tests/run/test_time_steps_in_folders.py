@@ -32,6 +32,7 @@ HALF, NEWMARK, DISSIPATIVE = (
 THREE = Schedule(((4e-3, 0.2), (1e-3, 0.3), (2.5e-3, inf)))
 
 
+@pytest.mark.long
 @serial
 def test_what_a_run_counts(tmp_path: Path):
     """Base steps in steps and t_end, accepted steps in rows and k, attempts thrown away on their

@@ -323,6 +323,7 @@ def problem_material() -> Any:
     return column.__kwdefaults__["material"]
 
 
+@pytest.mark.long
 def test_V15_friction_with_mass_at_the_contact() -> None:
     """Consistent mass and enough damping of high frequencies: the same impulses and friction
     work."""

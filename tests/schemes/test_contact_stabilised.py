@@ -201,6 +201,7 @@ def test_V98_contact_impulse_is_the_change_of_momentum():
     )
 
 
+@pytest.mark.long
 @pytest.mark.promise("guide/schemes.md", "the observed order is 0.4 to 0.95")
 def test_V13_foot_converges_with_the_published_rate():
     """V1.3, dt = h/2, 0 <= t <= 12: velocity jumps leave u(0, t) a rate between 0.4 and 0.95."""

@@ -148,6 +148,7 @@ def test_V92_no_energy_from_contact_without_mass(rho: float, courant: float, end
     assert four_bounces(of(rho), Redistributed(), courant) == pytest.approx(ends, abs=2e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("rho", "ends"), [(0.5, 0.966), (0.0, 0.933)])
 def test_V92_with_mass_the_damping_must_see_the_highest_frequency(rho: float, ends: float) -> None:
     """V1.3 at Courant number ½ on consistent mass: with strong damping of high frequencies no gain;

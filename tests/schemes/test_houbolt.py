@@ -88,6 +88,7 @@ def test_V92_no_energy_from_contact_on_either_mass(courant: float, ends: float, 
     assert energies[-1] == pytest.approx(ends, abs=3e-3) and max(energies) <= 1.0 + 1e-9
 
 
+@pytest.mark.long
 def test_V92_falling_bar_with_a_small_step() -> None:
     """V1.2 on consistent mass at Courant number 0.1, where Newmark reaches 11 E0: energy is never
     exceeded."""

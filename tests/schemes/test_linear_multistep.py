@@ -180,6 +180,7 @@ def test_V92_krenks_energy_identity_with_contact(beta, gamma):
     assert contacts > 20
 
 
+@pytest.mark.long
 def test_V92_hard_contact_in_the_acceleration_balance_gains_energy():
     """1.7, the negative result: V1.1 at Courant number one ends with 10.9 E0 and pressure
     oscillations of 2.3; V1.2 with some two hundred E0 after five periods. A limitation of the

@@ -123,6 +123,7 @@ def test_V92_krenks_identity_is_the_ledger(beta: float, gamma: float, mass: Any)
     assert contacts > 20
 
 
+@pytest.mark.long
 def test_V94_contact_work_without_mass() -> None:
     """V9.4: ½ (r1 g0 - r0 g1) is all that contact takes or gives; five periods of V1.2 at Courant
     number one end with 0.992 of the energy (table 1.7)."""

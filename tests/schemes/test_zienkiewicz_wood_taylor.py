@@ -47,6 +47,7 @@ def test_order(phi, order):
     ) == pytest.approx(order, abs=0.06)
 
 
+@pytest.mark.long
 def test_exact_motion_is_what_it_converges_to():
     problem = oscillators(damping=0.02, constant=4.0, excitation=SHAKEN)
     state = last_state(problem, HALF, dt=2e-4, steps=5000)
@@ -147,6 +148,7 @@ def bouncing_foot(t: float) -> float:
     return max(v0 * (t - t4) - g * (t - t4) ** 2 / 2, 0.0) if t > t4 else 0.0
 
 
+@pytest.mark.long
 def test_V12_foot_position_and_energy_after_five_periods():
     """V1.2, Courant number one: rms of the foot about 0.01 h0 in the first period; E/E0 = 0.949
     after five."""
@@ -159,6 +161,7 @@ def test_V12_foot_position_and_energy_after_five_periods():
     assert energy(problem, report.new) / 500.0 + 1.0 == pytest.approx(0.949, abs=5e-4)
 
 
+@pytest.mark.long
 @pytest.mark.promise("guide/schemes.md", "the observed order is 0.4 to 0.95")
 def test_V13_foot_converges_with_the_published_rate():
     """V1.3, dt = h/2, 0 <= t <= 12: velocity jumps leave u(0, t) a rate between 0.4 and 0.95."""

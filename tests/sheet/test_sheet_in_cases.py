@@ -56,6 +56,7 @@ points = {end = [2.0, 1.0]}
 SHEET = '[sheet]\nproject = "P"\nnumbers = ["contact_resultant", "u_x_end"]\n'
 
 
+@pytest.mark.long
 def test_half_the_time_step_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The cost is told before; the case runs with dt/2 and no finer mesh; the sheet has the change
     of each number; a sheet that is changed after the run asks for no run."""

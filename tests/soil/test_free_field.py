@@ -86,6 +86,7 @@ def test_with_other_schemes(comm, scheme):
     assert np.abs(free - tied).max() < 1e-10 * np.abs(tied).max()
 
 
+@pytest.mark.long
 @pytest.mark.serial
 @pytest.mark.promise(
     "guide/soil.md",

@@ -110,6 +110,7 @@ def beside_column(comm: Any, base: str, n: int, dt: float) -> tuple[Any, Any, li
     return found, column, [float(np.abs(ours / exact - 1.0).max()) for ours, exact in pairs]
 
 
+@pytest.mark.long
 @pytest.mark.serial  # several ranks have a shorter test below
 @pytest.mark.parametrize(
     ("base", "bounds"),
@@ -129,12 +130,14 @@ def test_a_strip_is_the_column_of_waves(comm, base, bounds):
     )
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_what_is_left_is_of_second_order(comm):
     coarse, fine = (beside_column(comm, "rock", n, dt)[2][:3] for n, dt in ((12, DT), (24, DT / 2)))
     assert all(half < 0.4 * whole for half, whole in zip(fine, coarse, strict=True)), (coarse, fine)
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_free_field_sides_follow(comm):
     """Their columns have the stiffness and damping of the cells beside them, run by run: nothing
@@ -197,6 +200,7 @@ def block_on_soil(comm: Any, peak: float, **options: Any) -> Any:
     return soil.strain_compatible(mesh, materials, curves, run, **options)
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_a_block_on_soil(comm):
     """Where it stands the soil is softer than at the sides; the block stays as it is; the weight is
@@ -233,6 +237,7 @@ def test_a_block_on_soil(comm):
     assert found.solution.history["contact_resultant"][0] == pytest.approx(weight, rel=1e-6)
 
 
+@pytest.mark.long
 def test_on_any_number_of_ranks(comm):
     """One rank by itself finds what all find together."""
     from mpi4py import MPI

@@ -40,6 +40,7 @@ def thrown_building(comm):
     return ContactProblem(system, pair, friction=Coulomb(0.3))
 
 
+@pytest.mark.long
 def test_factors_are_made_again_and_the_answer_is_the_condensed_one(problem, caplog):
     with caplog.at_level(logging.INFO):
         runs = [

@@ -282,6 +282,7 @@ def test_friction_without_symmetry_by_enumeration():
         )
 
 
+@pytest.mark.long
 def test_friction_that_is_not_solved_ends_in_its_sentence():
     """Skew parts far larger than the rest, and nodes whose own blocks are not positive definite: an
     answer, or a sentence; no warning of overflows, no other error. A guess may do no work, or

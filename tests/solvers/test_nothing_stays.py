@@ -33,6 +33,7 @@ give_back(keep_communicator(MPI.COMM_WORLD))
 """
 
 
+@pytest.mark.long
 def test_every_matrix_solver_and_vector_is_freed(tmp_path: Path) -> None:
     """As many destructions as creations in PETSc's own account."""
     account, support = tmp_path / "log", str(Path(__file__).parents[1] / "support")

@@ -106,6 +106,7 @@ def rubbing(G: Array, q: Array, mu: float) -> list[Array]:
     return found
 
 
+@pytest.mark.long
 @Fuzz("friction", __file__).property(
     entries=st.lists(ENTRY, min_size=1, max_size=16),
     places=st.lists(ENTRY, min_size=4, max_size=4),

@@ -61,6 +61,7 @@ def test_the_page_is_that_of_calculations_and_runs() -> None:
     assert compared == set(found)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", OWN)
 def test_case_is_in_order(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     case = str(ROOT / "demos" / "cases" / f"{name}.toml")
@@ -70,6 +71,7 @@ def test_case_is_in_order(name: str, tmp_path: Path, capsys: pytest.CaptureFixtu
     assert "the file is in order" in said
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", OWN)
 def test_statics_are_those_of_the_calculation(name: str, tmp_path: Path) -> None:
     """Weights, thrusts, uplifts and eccentricities, in closed form: N to 1e-8, e to 1e-7."""

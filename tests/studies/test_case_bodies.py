@@ -105,6 +105,7 @@ def test_a_beam_of_a_case_is_that_of_the_room(kind):
     assert found.facts["worst_certificate"] < 1e-12 and found.facts["energy_defect"] < 1e-10
 
 
+@pytest.mark.long
 def test_a_particle_returns_as_its_layer_was_asked_to():
     """e is found to the order of the time step, and the case is that of the room."""
     found = read_case(locate("layer")).run(COMM, progress=False)
@@ -148,6 +149,7 @@ def test_a_motion_shakes_a_particle_along_its_way(tmp_path):
     assert history["t"][-1] == pytest.approx(0.1) and found == pytest.approx(0.09, rel=1e-9)
 
 
+@pytest.mark.long
 def test_a_body_with_a_mesh_may_have_a_layer(tmp_path):
     """A stiff block that starts at rest on its support, moving into it, returns at half its
     speed: the layer stands before the support."""

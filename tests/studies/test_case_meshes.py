@@ -81,6 +81,7 @@ def test_the_dam_of_the_guide_stands_on_its_joint(tmp_path: Path) -> None:
     assert history["N_joint"][0] == pytest.approx(down, rel=1e-9)
 
 
+@pytest.mark.long
 def test_scripts_in_cases_are_refined(tmp_path: Path) -> None:
     """``refine`` of a GeoFile: the same groups on four times the cells; a wrong number is told with
     its table."""

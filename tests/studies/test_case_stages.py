@@ -73,6 +73,7 @@ def house(**supports: Any) -> Any:
     return vc.ContactProblem(system, contact, friction=vc.Coulomb(0.1))
 
 
+@pytest.mark.long
 def test_the_case_of_the_guide_is_the_same_in_python(shared_tmp: Path) -> None:
     """static_equilibrium, release, simulate, and simulate again with another wave; every stage has
     a folder."""
@@ -154,6 +155,7 @@ def test_nothing_moves_without_motion(shared_tmp: Path, extra: bool) -> None:
     assert np.abs(found["contact_resultant"] - weight).max() < 1e-9 * weight
 
 
+@pytest.mark.long
 def test_an_added_support_holds_the_body_where_it_is(shared_tmp: Path) -> None:
     """The prop: what it holds stays off its own place by the settlement, in the field output too,
     and carries nothing; then a push on the wall: the prop takes a share of it, which its release is
@@ -199,6 +201,7 @@ def test_a_support_that_carries_load_is_not_forgotten(shared_tmp: Path) -> None:
     assert said in f"{told.value}"
 
 
+@pytest.mark.long
 @pytest.mark.serial  # the stages above go from one to the next on two ranks
 def test_after_the_shock_the_house_rests_where_it_has_slid(shared_tmp: Path) -> None:
     """A static stage after the motion, on the same dashpots: the slip stays but for the 3 % by
@@ -220,6 +223,7 @@ class PowerFailure(Exception):
     """What ends a run without a word."""
 
 
+@pytest.mark.long
 @pytest.mark.serial
 @pytest.mark.promise("guide/stages.md", "the uninterrupted run to the last bit")
 def test_a_run_stopped_within_a_stage_goes_on_to_the_last_bit(
@@ -258,6 +262,7 @@ def test_a_run_stopped_within_a_stage_goes_on_to_the_last_bit(
         assert facts["restarted_from_step"] == begun_from and facts["steps"] == 10
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_a_stage_follows_from_the_end_of_the_one_before(tmp_path: Path) -> None:
     """A restart keeps the aftershock while the shock before it stays what it was, and makes it anew
@@ -300,6 +305,7 @@ def test_a_stage_follows_from_the_end_of_the_one_before(tmp_path: Path) -> None:
     assert sorted(one.name for one in (folder / "stages").iterdir()) == ["1_gravity", "2_event"]
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_many_records_share_the_static_stages(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

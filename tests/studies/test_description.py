@@ -77,6 +77,7 @@ def axial(n: int, height: float, cells: int) -> float:
     return float(2.0 * np.pi / np.sqrt(6.0 * c**2 / h**2 * (1.0 - np.cos(kh)) / (2.0 + np.cos(kh))))
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_numbers_of_two_blocks(shared_tmp: Path) -> None:
     """V11.1: masses, sizes, wave lengths; periods of axial waves in both blocks as one where they

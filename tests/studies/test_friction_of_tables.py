@@ -70,6 +70,7 @@ def written(folder: Path, text: str = BLOCKS) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_two_blocks_slide_by_their_own_coefficients(shared_tmp: Path) -> None:
     """v²/(2 mu g): 5 mm on the rough ground, 20 mm on the smooth one. The blocks are pressed at
     once, which swings the normal force: measured within 0.25 %."""

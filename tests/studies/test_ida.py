@@ -150,6 +150,7 @@ def test_the_example_gives_a_tidy_table(example: tuple[Path, str]) -> None:
     assert (folder / "results" / "ida" / "ida.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.long
 def test_finished_runs_are_kept(study: Path) -> None:
     """Nothing runs again; the table is the same to the byte, also from rows that a killed study had
     not written."""

@@ -127,6 +127,7 @@ def test_loads_of_a_dam_by_hand(shared_tmp: Path) -> None:
     assert total["point"] == pytest.approx((8.0 + turning / (WEIGHT - UPLIFT), 6.0), rel=1e-9)
 
 
+@pytest.mark.long
 def test_loads_are_told_per_metre_whatever_the_slice(shared_tmp: Path) -> None:
     """A slice of 2 m carries twice the load, and a metre of it the same; a panel has its own."""
     one = rows_of(described(shared_tmp))
@@ -241,6 +242,7 @@ def test_points_of_attack_in_space() -> None:
     assert point == pytest.approx([0.0, 2.0, 5.0])
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_the_report_has_the_rows_of_the_check(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
@@ -421,6 +423,7 @@ points = {top = [9.0, 16.0]}
 """
 
 
+@pytest.mark.long
 @pytest.mark.serial
 @pytest.mark.parametrize(
     ("text", "settings", "said"),

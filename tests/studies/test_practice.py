@@ -60,6 +60,7 @@ def run(name: str, out: Path, *more: str) -> Any:
     return history
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["wall", "dam", "culvert"])
 def test_starter_is_written_and_checked(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -75,6 +76,7 @@ def test_starter_is_written_and_checked(
     assert "contact" in capsys.readouterr().out
 
 
+@pytest.mark.long
 def test_from_new_to_report_in_four_commands(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -93,6 +95,7 @@ def test_from_new_to_report_in_four_commands(
     )
 
 
+@pytest.mark.long
 def test_wall_stands_between_active_pressure_and_that_at_rest(tmp_path: Path) -> None:
     """At rest the faces together carry the wall's weight and no shear, the rock carries all, and
     the thrust on the stem lies between Rankine's of a dense sand and K0 of the elastic soil;
@@ -123,6 +126,7 @@ def test_wall_stands_between_active_pressure_and_that_at_rest(tmp_path: Path) ->
     )
 
 
+@pytest.mark.long
 def test_wall_shares_its_gravity_stage_and_its_matrices_over_records() -> None:
     """What a study computes once for all records, without a folder for the fields that the case
     writes."""
@@ -133,6 +137,7 @@ def test_wall_shares_its_gravity_stage_and_its_matrices_over_records() -> None:
     assert state.r_n.max() > 0.0
 
 
+@pytest.mark.long
 @pytest.mark.promise("guide/practice.md", "the run has them to nine digits")
 def test_dam_has_the_resultant_of_weight_water_and_uplift(tmp_path: Path) -> None:
     """N = W - U, T = -H and their eccentricity, in closed form; the factor of safety mu N/|T| falls
@@ -160,6 +165,7 @@ def test_dam_has_the_resultant_of_weight_water_and_uplift(tmp_path: Path) -> Non
     assert "at the toe" in toes["pressure_high_joint"]["meaning"]
 
 
+@pytest.mark.long
 @pytest.mark.promise(
     "guide/practice.md", "a beam with shear and a rigid deck, to 0.2 %", bound="1 %"
 )
@@ -232,6 +238,7 @@ system = {prescribed = [
 """
 
 
+@pytest.mark.long
 @pytest.mark.promise(
     "guide/practice.md", "the run agrees with this to 2 %", bound="8 %, beside the box"
 )

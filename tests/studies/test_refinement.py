@@ -63,6 +63,7 @@ def written(folder: Path) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_both_columns_and_their_difference(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -16,6 +16,7 @@ from vi_contact.run.files.reading import read_run
 pytestmark = pytest.mark.serial
 
 
+@pytest.mark.long
 def test_two_frames_pound(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -122,6 +122,7 @@ def by_hand() -> Any:
     return soil.strain_compatible(mesh, materials, curves, run)
 
 
+@pytest.mark.long
 def test_a_case_is_the_calls_of_python(tmp_path):
     """The last run is DIR, those before it DIR/iterations/1, 2, …; a second time they are
     replaced."""
@@ -159,6 +160,7 @@ def test_units_of_curves(tmp_path):
     )
 
 
+@pytest.mark.long
 def test_with_stages_the_last_one_tells_the_strains(tmp_path):
     """Gravity as a stage of its own: the same run, its folders within those of the runs."""
     plain = read_case(written(tmp_path)).run(COMM, progress=False)
@@ -202,6 +204,7 @@ def test_what_is_refused(tmp_path, old, new, words):
         read_case(written(tmp_path, CASE.replace(old, new, 1))).run(COMM, progress=False)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
@@ -239,6 +242,7 @@ def test_no_restart_no_static_end_and_no_study(tmp_path):
         read_case(written(tmp_path, CASE + STAGES.replace("dynamic", "static"))).run(COMM)
 
 
+@pytest.mark.long
 def test_the_command_runs_it(tmp_path, capsys):
     assert main(["run", str(written(tmp_path)), "--check", "--out", str(tmp_path / "checked")]) == 0
     assert (

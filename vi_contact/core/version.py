@@ -1,3 +1,3 @@
 """Tell the version of the package, once."""
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"

@@ -399,10 +399,12 @@ class Session:
         """
         cross_check = self.request.cross_check
         seconds_per_step = float(np.median(list(self.seconds))) if self.seconds else float("nan")
+        # What a folder is written with counts, and is imported for nothing else.
+        needed = () if self.request.out is None else ("h5py",)
         return {
             "status": status,
             "reason": reason,
-            "versions": list_versions("h5py"),
+            "versions": list_versions(*needed),
             **self.settings(),
             "restarted_from_step": self.resumed_from,
             **self.table.facts(),

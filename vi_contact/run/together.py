@@ -10,6 +10,10 @@ goes on alone.
 A ``Together`` is one run, and yields what ``March`` yields. When it is asked for a step and has
 none, its ``Group`` makes the next step of all runs of it, and each run keeps its report until it is
 asked (``waiting``). Who leaves a group goes on as a plain ``March`` from where it is.
+
+So there are two ways to make a step, and a run alone keeps the one of ``Stepper``: as a group of
+one it would take 1.54 times as long at 216 unknowns, and 1.13 times at 20 000
+(``benchmarks/many_runs.py --group-of-one``).
 """
 
 from collections import deque
@@ -40,6 +44,9 @@ from .rows import (
 )
 from .stepper import after_impact
 from .time_steps import StepPlan
+
+# Fewest runs that step together: benchmarks/many_runs.py --group-of-one sets 1.
+FEWEST = 2
 
 
 class Together(March):
@@ -139,7 +146,7 @@ class Group:
 
     def _go_on_with(self, runs: list[Together], states: list[State]) -> None:
         """Go on with these runs from these states; one run alone is no group."""
-        self._runs = runs if len(runs) > 1 else []
+        self._runs = runs if len(runs) >= FEWEST else []
         for run, state in zip(runs, states, strict=True):
             run.group = self if self._runs else None
             run.state = state

@@ -165,6 +165,15 @@ class Search:
             x_ref=self.scales.displacement,
         )
 
+    def form_first_residual(self, x: Array) -> Array:
+        """Return the residual at the x that a step begins with. Collective.
+
+        It costs one product, and none at x = 0, where increments begin.
+        """
+        if largest(self.comm, bool(x.any())):
+            return np.asarray(self.load - (self.operator @ x))
+        return self.load
+
     def form_residual(self, x: Array) -> tuple[Array, float]:
         """Return the residual formed afresh at x, and the largest of the free unknowns.
 
@@ -225,7 +234,7 @@ def search_set(
     count = 0  # changes of the set
     refinements = 0  # solves that began from a residual formed afresh
     contact.place(x)
-    residual = search.load - (search.operator @ x)
+    residual = search.form_first_residual(x)
     while True:
         # Solve on the present set, until that is done or a sign is wrong.
         x, residual, reason = cg.solve(residual, x, search.watch)
