@@ -6,7 +6,8 @@ Each facet i looks along its outward normal. It sees a facet j of another body, 
 
 where the overlap is that of i with the projection of j along n_i, and the gap is the distance along
 n_i in the middle of the overlap. What is hidden by a nearer facet, of any body, is not seen. Facets
-pair where each sees the other.
+pair where each sees the other, unless others leave less than a quarter of what their faces have in
+common: that is a look through a slit.
 
 The candidates come from trees of middles of facets. Facets are sorted into classes by their size,
 by factors of two, so that one large facet does not make every search wide: the search of a class in
@@ -14,12 +15,13 @@ another one has the radius of both, plus the gap.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...core.algebra import Array, Indices, Mask
 from ...core.corners import FEATURE_ANGLE
+from ...meshes.rows import number_parts
 from .clipping import areas, intersect, subtract, triangles
 from .nodes import Rows
 from .sight import pairs_of
@@ -27,6 +29,8 @@ from .skin import Skin
 
 FACING = np.cos(FEATURE_ANGLE)  # CHOSEN: normals of a pair are opposite to 30°
 LEAST_OVERLAP = 1e-3  # CHOSEN: of the smaller facet; less is a sliver at the edge
+# CHOSEN: of the overlap of two faces; less that is seen of it between others is a slit
+LEAST_SEEN = 0.25
 # cosine up to which a facet that turns away from a look still hides what is behind it
 EDGE_ON = 0.02
 
@@ -64,10 +68,15 @@ def find_sights(skin: Skin, within: float) -> tuple[Sights, Sights]:
         the pairs in the order of the looking facets, and the sights with a gap below minus the
         tolerance: where bodies overlap, or a thin body lies in front of another.
     """
-    near = _find_near(skin, within)
-    parts = [_look(skin, i, j) for i, j in near]
     nothing = np.zeros(0, dtype=np.int64)
-    sights = Sights.join([_look(skin, nothing, nothing), *parts])
+    parts = [_look(skin, i, j) for i, j in [(nothing, nothing), *_find_near(skin, within)]]
+    # polygons get as many corners as the largest has
+    width = max(part.shapes.shape[1] for part in parts)
+    padded = []
+    for part in parts:
+        missing = (0, width - part.shapes.shape[1])
+        padded.append(replace(part, shapes=np.pad(part.shapes, ((0, 0), missing, (0, 0)), "edge")))
+    sights = Sights.join(padded)
     order = np.lexsort((sights.seen, sights.looking))
     sights = sights.pick(order)
 
@@ -82,14 +91,20 @@ def find_sights(skin: Skin, within: float) -> tuple[Sights, Sights]:
     # what is in front, and of it what no nearer facet hides
     front = large & (sights.gaps >= -tolerance) & (sights.gaps <= within + tolerance)
     sights = sights.pick(front)
-    overlaps = _see(sights, tolerance[front], LEAST_OVERLAP * smaller[front])
-    chosen = facing[front] & (overlaps > LEAST_OVERLAP * smaller[front])
-    sights = sights.pick(chosen)
+    tolerance = tolerance[front]
+    least = LEAST_OVERLAP * smaller[front]
+    overlaps = _see(sights, tolerance, least)
+
+    # of what faces each other, where enough of both sides is seen
+    rows = np.flatnonzero(facing[front])
+    rows = rows[_are_mutual(sights.pick(rows), len(skin.body))]
+    part = group_pairs(skin, sights.pick(rows))
+    total = np.bincount(part, weights=sights.overlaps[rows])
+    seen = np.bincount(part, weights=overlaps[rows])
+    rows = rows[(overlaps[rows] > least[rows]) & (seen > LEAST_SEEN * total)[part]]
     # polygons at curved joints have gaps that the joint does not have
-    gaps = np.where(sights.gaps <= tolerance[front][chosen], 0.0, sights.gaps)
-    pairs = Sights(
-        sights.looking, sights.seen, gaps, overlaps[chosen], sights.middles, sights.shapes
-    )
+    gaps = np.where(sights.gaps <= tolerance, 0.0, sights.gaps)
+    pairs = replace(sights, gaps=gaps, overlaps=overlaps).pick(rows)
     return pairs.pick(_are_mutual(pairs, len(skin.body))), behind
 
 
@@ -156,18 +171,7 @@ def _look(skin: Skin, i: Indices, j: Indices) -> Sights:
     # the point x + gap n_i is in the plane of j
     cosine = np.sum(skin.normals[i] * skin.normals[j], axis=1)
     gaps = np.sum((skin.middles[j] - points) * skin.normals[j], axis=1) / cosine
-    return Sights(i, j, gaps, overlaps, points, _pad(shapes, skin.corners.shape[1]))
-
-
-def _pad(shapes: Array, corners: int) -> Array:
-    """Return shapes (k, c, t) with as many corners as two facets have at most in common.
-
-    Args:
-        shapes: polygons, or ends of intervals.
-        corners: of a facet.
-    """
-    width = 2 if shapes.shape[2] == 1 else 2 * corners
-    return np.pad(shapes, ((0, 0), (0, width - shapes.shape[1]), (0, 0)), "edge")
+    return Sights(i, j, gaps, overlaps, points, shapes)
 
 
 def _find_centroids(polygons: Array) -> Array:
@@ -252,3 +256,34 @@ def _are_mutual(sights: Sights, count: int) -> Mask:
     way = sights.looking * count + sights.seen
     back = sights.seen * count + sights.looking
     return np.isin(way, back)
+
+
+def group_pairs(skin: Skin, pairs: Sights) -> Indices:
+    """Return the number (k,) of the joint of each pair of facets.
+
+    What is joined are entries, pairs of a facet and the body that it faces: those of two facets
+    that see each other, and those of neighbours on a smooth face that face the same body.
+
+    Args:
+        skin: the boundary of all bodies.
+        pairs: of facets, each both ways.
+    """
+    key = pairs.looking * skin.bodies + skin.body[pairs.seen]
+    back = pairs.seen * skin.bodies + skin.body[pairs.looking]
+    entries, entry = np.unique(key, return_inverse=True)
+    # neighbours on smooth faces: each entry of the first, and that of the second with its body
+    first, second = skin.links
+    start = np.searchsorted(entries, first * skin.bodies)
+    count = np.searchsorted(entries, (first + 1) * skin.bodies) - start
+    link = np.repeat(np.arange(len(first)), count)
+    among = np.arange(len(link)) - np.repeat(np.cumsum(count) - count, count)
+    ours = start[link] + among
+    wanted = second[link] * skin.bodies + entries[ours] % max(skin.bodies, 1)
+    theirs = np.minimum(np.searchsorted(entries, wanted), max(len(entries) - 1, 0))
+    there = entries[theirs] == wanted if len(entries) else np.zeros(0, dtype=bool)
+    number_of = number_parts(
+        len(entries),
+        np.concatenate([entry, ours[there]]),
+        np.concatenate([np.searchsorted(entries, back), theirs[there]]),
+    )
+    return number_of[entry]

@@ -18,14 +18,13 @@ from ...core.errors import InputError
 from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem
 from ...core.timing import report_time
-from ...meshes.rows import number_parts
 from .. import compat
 from ..body.space import FemSpace, space_of
 from ..mesh.communicators import MpiComm
 from ..mesh.group_checks import cells_of
 from ..mesh.tagged_mesh import Cells, Facets, Tags
 from .corner_points import find_corner_points
-from .facing import Sights, find_sights
+from .facing import Sights, find_sights, group_pairs
 from .joined import joined_surfaces
 from .joint_list import NAMED, Joint, Joints
 from .matching import Matching, NodeToNode
@@ -306,7 +305,7 @@ def _make_joints(
     mesh: Mesh, skin: Skin, pairs: Sights, names: Sequence[str]
 ) -> list[Joint]:
     """Return the joints that pairs of facets make, in the order of their bodies and facets."""
-    part = _group(skin, pairs)
+    part = group_pairs(skin, pairs)
     body = skin.body[pairs.looking]
     other = skin.body[pairs.seen]
     low = np.minimum(body, other)
@@ -324,37 +323,6 @@ def _make_joints(
     for place, (start, end) in enumerate(zip(starts, ends, strict=True)):
         joints.append(_make_joint(mesh, skin, pairs.pick(rows[start:end]), names, place))
     return joints
-
-
-def _group(skin: Skin, pairs: Sights) -> Indices:
-    """Return the number (k,) of the joint of each pair of facets.
-
-    What is joined are entries, pairs of a facet and the body that it faces: those of two facets
-    that see each other, and those of neighbours on a smooth face that face the same body.
-
-    Args:
-        skin: the boundary of all bodies.
-        pairs: of facets, each both ways.
-    """
-    key = pairs.looking * skin.bodies + skin.body[pairs.seen]
-    back = pairs.seen * skin.bodies + skin.body[pairs.looking]
-    entries, entry = np.unique(key, return_inverse=True)
-    # neighbours on smooth faces: each entry of the first, and that of the second with its body
-    first, second = skin.links
-    start = np.searchsorted(entries, first * skin.bodies)
-    count = np.searchsorted(entries, (first + 1) * skin.bodies) - start
-    link = np.repeat(np.arange(len(first)), count)
-    among = np.arange(len(link)) - np.repeat(np.cumsum(count) - count, count)
-    ours = start[link] + among
-    wanted = second[link] * skin.bodies + entries[ours] % max(skin.bodies, 1)
-    theirs = np.minimum(np.searchsorted(entries, wanted), max(len(entries) - 1, 0))
-    there = entries[theirs] == wanted if len(entries) else np.zeros(0, dtype=bool)
-    number_of = number_parts(
-        len(entries),
-        np.concatenate([entry, ours[there]]),
-        np.concatenate([np.searchsorted(entries, back), theirs[there]]),
-    )
-    return number_of[entry]
 
 
 def _make_joint(

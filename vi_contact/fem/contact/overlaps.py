@@ -21,7 +21,7 @@ from ...core.errors import InputError
 from .. import compat
 from .facing import Sights
 from .nodes import Rows, gather_rows
-from .skin import Skin
+from .skin import TOUCH, Skin
 
 BELOW = 1e-3  # of the size of a facet: depth of the points below it
 # shares of the way between two facets; odd ones, which no face of a cell is likely to have
@@ -189,8 +189,15 @@ def _measure_depths(skin: Skin, facets: Indices, bodies: Indices) -> Array:
     depths = np.zeros(len(facets))
     for row, (facet, body) in enumerate(zip(facets, bodies, strict=True)):
         theirs = skin.body == body
+        reach = skin.reach[theirs]
         away = skin.middles[theirs] - skin.middles[facet]
         across = np.abs(np.sum(away * skin.normals[theirs], axis=1))
-        beyond = np.linalg.norm(away, axis=1) - skin.reach[theirs]
+        beyond = np.linalg.norm(away, axis=1) - reach
         depths[row] = np.maximum(across, beyond).min()
+        # where both boundaries are one: as far as the facet has to go back to leave the body
+        if depths[row] <= TOUCH * skin.reach[facet]:
+            back = -away @ skin.normals[facet]
+            aside = np.linalg.norm(away + back[:, None] * skin.normals[facet], axis=1)
+            exits = back[(back > BELOW * reach) & (aside <= reach)]
+            depths[row] = exits.min() if len(exits) else 2.0 * skin.reach[facet]
     return depths
