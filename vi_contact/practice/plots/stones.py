@@ -8,7 +8,6 @@ import numpy as np
 from ...core.algebra import Array, Indices
 from ...core.checks import number, provides
 from ...core.errors import InputError
-from ...run.rigid_blocks import GROUND
 from ...run.rigid_limit import RigidLimit
 from .histories import canvas, save
 
@@ -55,7 +54,8 @@ def plot_mechanism(
 ) -> Path:
     """Draw rigid blocks at their limit load, moved as the mechanism moves them.
 
-    Where they stand is drawn in grey. Joints that open are red, joints that only slide are blue.
+    Where they stand is drawn in grey. The sides of joints that open are red, of those that only
+    slide blue.
 
     Args:
         limit: of ``rigid_limit_load``, whose blocks are those of a mesh.
@@ -84,10 +84,12 @@ def plot_mechanism(
     _draw_bodies(axis, blocks.outlines, blocks.outline_bodies, faint=True)
     _draw_bodies(axis, moved, blocks.outline_bodies)
     for colour, label, some in _sort_joints(limit):
-        ends = blocks.ends[some]
-        if len(ends):
-            axis.plot(*ends.transpose(2, 1, 0), color=colour, lw=2.2, zorder=3)
-            axis.plot([], [], color=colour, lw=2.2, label=label)
+        if len(some):
+            # both sides of each joint, where they have moved
+            for side in (0, 1):
+                ends = _move(limit, blocks.ends[some], blocks.bodies[some, side], size * whole)
+                axis.plot(*ends.transpose(2, 1, 0), color=colour, lw=1.8, zorder=3)
+            axis.plot([], [], color=colour, lw=1.8, label=label)
     axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize=8)
     heading = title if title is not None else f"mechanism at {limit.multiplier:.4g} times the load"
     return save(figure, path, heading)
@@ -119,20 +121,13 @@ def _move(limit: RigidLimit, points: Array, bodies: Indices, size: float) -> Arr
         bodies: (k,) their blocks.
         size: displacement where the velocity is one [m].
     """
-    velocities = np.vstack([limit.velocities, np.zeros(3)])  # GROUND is the last row
+    velocities = np.vstack([limit.velocities, np.zeros(3)])  # the last row, -1, does not move
     centres = np.vstack([limit.blocks.centres, np.zeros(2)])
-    # rotated as rigid bodies, so that stones keep their sizes
-    angle = size * velocities[bodies, 2][:, None]
+    # small displacements, so that blocks which move as one stay together
     arm = points - centres[bodies][:, None]
-    turned = np.stack(
-        [
-            np.cos(angle) * arm[:, :, 0] - np.sin(angle) * arm[:, :, 1],
-            np.sin(angle) * arm[:, :, 0] + np.cos(angle) * arm[:, :, 1],
-        ],
-        axis=2,
-    )
-    shift = size * velocities[bodies, :2]
-    return np.where(bodies[:, None, None] == GROUND, points, points + turned - arm + shift[:, None])
+    aside = np.stack([-arm[:, :, 1], arm[:, :, 0]], axis=2)
+    shift = velocities[bodies, None, :2] + velocities[bodies, 2][:, None, None] * aside
+    return points + size * shift
 
 
 def _draw_in_plane(joints: Any) -> Any:
@@ -184,7 +179,8 @@ def _draw_in_space(joints: Any) -> Any:
         ylabel="z [m]",
         zlabel="y [m]",
     )
-    axis.set_box_aspect(high - low)
+    axis.locator_params(nbins=5)
+    axis.set_box_aspect(high - low, zoom=0.85)  # room for the words of the axes
     return figure
 
 
