@@ -159,7 +159,9 @@ def test_the_list_is_the_same_turned_moved_scaled_and_mirrored(unlike: int) -> N
     [
         wall_of(3, 3, unlike=2, ground=0.2, simplices=True),
         wall_of(2, 3, depth=0.2, rows=2, ground=0.2),
-        meshes.BricksMesh(counts=(2, 2, 2), lengths=(0.1, 0.2, 0.1), gaps=(0.0,) * 3, divisions=(2, 2, 2)),
+        meshes.BricksMesh(
+            counts=(2, 2, 2), lengths=(0.1, 0.2, 0.1), gaps=(0.0,) * 3, divisions=(2, 2, 2)
+        ),
     ],
     ids=["wall", "wall in space", "bricks"],
 )
@@ -335,10 +337,10 @@ def test_bodies_without_joints_are_told(caplog: pytest.LogCaptureFixture) -> Non
         ([((0.0, 0.4), (3.0, 0.6), (9, 1)), ((1.4, 0.0), (1.6, 1.0), (1, 5))], 0.1, None),
     ],
 )
-def test_bodies_that_overlap_are_refused(
-    boxes: list[Any], depth: float, place: int | None
-) -> None:
-    with pytest.raises(InputError, match="box_1 and box_2 overlap by|box_2 and box_1 overlap by") as e:
+def test_bodies_that_overlap_are_refused(boxes: list[Any], depth: float, place: int | None) -> None:
+    with pytest.raises(
+        InputError, match="box_1 and box_2 overlap by|box_2 and box_1 overlap by"
+    ) as e:
         find(Boxes(tuple(boxes)))
     told = float(str(e.value).split("overlap by ")[1].split(" m ")[0])
     # that of a body deep inside another is a distance to some facet, told roughly
@@ -347,9 +349,7 @@ def test_bodies_that_overlap_are_refused(
     else:
         assert 0.0 < told <= 1.01 * depth
     with pytest.raises(InputError, match="overlap by"):
-        in_space = tuple(
-            ((*low, 0.0), (*high, 1.0), (*cells, 2)) for low, high, cells in boxes
-        )
+        in_space = tuple(((*low, 0.0), (*high, 1.0), (*cells, 2)) for low, high, cells in boxes)
         find(Boxes(in_space, simplices=True))
 
 

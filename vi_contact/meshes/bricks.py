@@ -5,8 +5,8 @@ axis. The first layer stands on y = 0; without gaps along y the bricks of a colu
 
 Physical groups: cells "bricks", and one for each brick, "brick_3_1" (third from the left, lowest
 layer) or "brick_3_1_2" in space (second from the back); boundary "left", "right" (x lowest,
-highest), "bottom", "top" (y), "back", "front" (z) of the array. The table is the body "ground", with
-boundary "ground_left", "ground_right", "ground_bottom", "ground_top", "ground_back",
+highest), "bottom", "top" (y), "back", "front" (z) of the array. The table is the body "ground",
+with boundary "ground_left", "ground_right", "ground_bottom", "ground_top", "ground_back",
 "ground_front".
 """
 
@@ -79,7 +79,7 @@ class BricksMesh(OfGrids):
         """Return the grids of all bricks, layer by layer, and that of the table."""
         d = len(self.counts)
         steps = [length + gap for length, gap in zip(self.lengths, self.gaps, strict=True)]
-        grids = []
+        grids: list[Grid] = []
         # layers from below, in each from the back to the front and from the left to the right
         order = [range(n) for n in (self.counts[1], *self.counts[2:], self.counts[0])]
         for y, *z, x in product(*order):

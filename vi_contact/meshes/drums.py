@@ -3,8 +3,8 @@
 The column stands on y = 0, its axis is that of y. In the plane a drum is a trapezium, in space it
 is round: a polygon of four times as many sides as it has cells across.
 
-Physical groups: cells "drums" and "drum_1", "drum_2", … from below; boundary "bottom", "top" (y) and
-"side" of the column. With ground there are cells "ground" and boundary "ground_left",
+Physical groups: cells "drums" and "drum_1", "drum_2", … from below; boundary "bottom", "top" (y)
+and "side" of the column. With ground there are cells "ground" and boundary "ground_left",
 "ground_right", "ground_bottom", "ground_top", "ground_back", "ground_front".
 """
 
@@ -91,9 +91,7 @@ class DrumsMesh(OfGrids):
             reach = 1.5 * self.width
             bed = (3 * across, up, 3 * across)[:d]
             grids.append(
-                make_ground(
-                    [-reach] * d, [reach] * d, self.ground, bed, simplices=self.simplices
-                )
+                make_ground([-reach] * d, [reach] * d, self.ground, bed, simplices=self.simplices)
             )
         return turn_grids(grids, self.angle)
 

@@ -83,8 +83,8 @@ class RigidBlocks:
 
     def describe(self, joint: int) -> str:
         """Return the names of the blocks of a joint, as words."""
-        words = ["the ground" if body == GROUND else self.names[body] for body in self.bodies[joint]]
-        return " and ".join(words)
+        names = [*self.names, "the ground"]  # the last one is -1
+        return " and ".join(names[body] for body in self.bodies[joint])
 
 
 def rigid_blocks(joints: Any, *, fixed: Sequence[str | int]) -> RigidBlocks:

@@ -44,12 +44,13 @@ class RigidLimit:
     Attributes:
         multiplier: lambda; infinite where the live load alone is borne at any size.
         forces: (m, 2, 2) pressing force and shear at both ends of each joint; they need not be the
-            only ones in equilibrium. The shear acts along (-n_y, n_x) on the first block.
+            only ones in equilibrium. The first block has -N n + T t with t = (-n_y, n_x), the second
+            one the opposite.
         velocities: (n, 3) of the blocks, along x, along y and anticlockwise [1/m] about their
             centres; scaled so that the fastest end of a joint or centre has the velocity one.
             Zeros where the multiplier is infinite.
-        rates: (m, 2, 2) at both ends of each joint, how fast it opens, and how fast the second block
-            slides along (-n_y, n_x) over the first, in the same scale.
+        rates: (m, 2, 2) at both ends of each joint, how fast it opens, and how fast the second
+            block slides along (-n_y, n_x) over the first, in the same scale.
         moving: numbers of the joints that open or slide.
         certificate: largest of the residuals of equilibrium, of the mechanism and of the equality
             of their works, over the sum of the loads.

@@ -98,10 +98,10 @@ def find_sights(skin: Skin, within: float) -> tuple[Sights, Sights]:
     # of what faces each other, where enough of both sides is seen
     rows = np.flatnonzero(facing[front])
     rows = rows[_are_mutual(sights.pick(rows), len(skin.body))]
-    part = group_pairs(skin, sights.pick(rows))
-    total = np.bincount(part, weights=sights.overlaps[rows])
-    seen = np.bincount(part, weights=overlaps[rows])
-    rows = rows[(overlaps[rows] > least[rows]) & (seen > LEAST_SEEN * total)[part]]
+    face = group_pairs(skin, sights.pick(rows))
+    total = np.bincount(face, weights=sights.overlaps[rows])
+    seen = np.bincount(face, weights=overlaps[rows])
+    rows = rows[(overlaps[rows] > least[rows]) & (seen > LEAST_SEEN * total)[face]]
     # polygons at curved joints have gaps that the joint does not have
     gaps = np.where(sights.gaps <= tolerance, 0.0, sights.gaps)
     pairs = replace(sights, gaps=gaps, overlaps=overlaps).pick(rows)

@@ -51,9 +51,9 @@ def find_joints(
     Bodies are parts of the mesh that share no node. Two facets of different bodies pair where their
     outward normals are opposite to 30°, the gap along the normal is at most ``within`` and no other
     facet lies between them. Pairs that hang together on both bodies are one joint; where a face
-    turns by more than 30° another joint begins. Facets touch whose distance is at most 1e-6 of their
-    size, at curved faces with what straight facets leave out. The list is the same on any number of
-    ranks.
+    turns by more than 30° another joint begins. Facets touch whose distance is at most 1e-6 of
+    their size, at curved faces with what straight facets leave out. The list is the same on any
+    number of ranks.
 
     Args:
         where: a mesh in the plane or in space, or a system of ``assemble``; facets that are tied in
@@ -167,9 +167,7 @@ def _read_where(owner: str, where: Any) -> tuple[Mesh, list[tuple[Facets, Facets
     return mesh, ties
 
 
-def _read_groups(
-    mesh: Mesh, skin: Skin, between: Sequence[Cells] | None
-) -> list[Indices]:
+def _read_groups(mesh: Mesh, skin: Skin, between: Sequence[Cells] | None) -> list[Indices]:
     """Return the bodies of each group, none where all bodies count. Collective.
 
     Raises:
@@ -184,7 +182,7 @@ def _read_groups(
     groups = []
     for group in given:
         cells_of("find_joints", "between", group, mesh)
-        whole, part = _list_bodies(mesh, skin, [group.indices])[0]
+        whole, part = _list_bodies(mesh, skin, [group])[0]
         if len(part) or not len(whole):
             raise InputError(
                 f"find_joints: the cell group '{group.name}' is a part of a body and shares nodes "
@@ -208,7 +206,7 @@ def _name_bodies(mesh: Mesh, skin: Skin, tags: Tags | None) -> list[str]:
         return names
     instance("find_joints", "tags", tags, Tags, "give the groups that build_mesh returns")
     groups = [group for group in tags.values() if isinstance(group, Cells)]
-    found = _list_bodies(mesh, skin, [group.indices for group in groups])
+    found = _list_bodies(mesh, skin, groups)
     named: set[int] = set()
     for group, (whole, part) in zip(groups, found, strict=True):
         if len(whole) == 1 and not len(part) and int(whole[0]) not in named:
@@ -217,23 +215,20 @@ def _name_bodies(mesh: Mesh, skin: Skin, tags: Tags | None) -> list[str]:
     return names
 
 
-def _list_bodies(
-    mesh: Mesh, skin: Skin, groups: Sequence[Indices]
-) -> list[tuple[Indices, Indices]]:
+def _list_bodies(mesh: Mesh, skin: Skin, groups: Sequence[Cells]) -> list[tuple[Indices, Indices]]:
     """Return the bodies that are in each group as a whole, and those in part. Collective.
 
     Args:
         mesh: the mesh.
         skin: the boundary of all bodies.
-        groups: local cells of each group.
+        groups: of cells.
     """
     owned = mesh.topology.index_map(mesh.topology.dim).size_local
     body = skin.body_of_node[compat.geometry_dofmap(mesh)[:owned, 0]]
     counts = np.zeros((len(groups) + 1, skin.bodies), dtype=np.int64)
     counts[-1] = np.bincount(body, minlength=skin.bodies)
-    for row, cells in enumerate(groups):
-        mine = np.asarray(cells)
-        mine = mine[mine < owned]
+    for row, group in enumerate(groups):
+        mine = group.indices[group.indices < owned]
         counts[row] = np.bincount(body[mine], minlength=skin.bodies)
     counts = np.sum(from_each(MpiComm(mesh.comm), counts), axis=0)
     every = counts[-1]
@@ -257,9 +252,7 @@ def _are_between(skin: Skin, pairs: Sights, groups: list[Indices]) -> Mask:
     return np.asarray(forward | backward)
 
 
-def _find_tied(
-    comm: MpiComm, skin: Skin, pairs: Sights, ties: list[tuple[Facets, Facets]]
-) -> Mask:
+def _find_tied(comm: MpiComm, skin: Skin, pairs: Sights, ties: list[tuple[Facets, Facets]]) -> Mask:
     """Say which pairs (k,) of facets are tied to each other. Collective.
 
     Args:
@@ -301,9 +294,7 @@ def _warn_of_lonely(
 # --------------------------------------------------------------------------------------------------
 
 
-def _make_joints(
-    mesh: Mesh, skin: Skin, pairs: Sights, names: Sequence[str]
-) -> list[Joint]:
+def _make_joints(mesh: Mesh, skin: Skin, pairs: Sights, names: Sequence[str]) -> list[Joint]:
     """Return the joints that pairs of facets make, in the order of their bodies and facets."""
     part = group_pairs(skin, pairs)
     body = skin.body[pairs.looking]
@@ -325,9 +316,7 @@ def _make_joints(
     return joints
 
 
-def _make_joint(
-    mesh: Mesh, skin: Skin, pairs: Sights, names: Sequence[str], place: int
-) -> Joint:
+def _make_joint(mesh: Mesh, skin: Skin, pairs: Sights, names: Sequence[str], place: int) -> Joint:
     """Return a joint of all these pairs of facets, each both ways.
 
     Args:

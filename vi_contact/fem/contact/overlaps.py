@@ -108,9 +108,7 @@ def refuse_overlaps(owner: str, deep: Deep, names: list[str]) -> None:
         )
 
 
-def _find_bodies(
-    comm: Comm, mesh: Any, skin: Skin, points: Array
-) -> tuple[Indices, Indices]:
+def _find_bodies(comm: Comm, mesh: Any, skin: Skin, points: Array) -> tuple[Indices, Indices]:
     """Return in which bodies points are, as pairs (k,), (k,) of a point and a body. Collective.
 
     Args:

@@ -105,9 +105,7 @@ def gather_skin(comm: Comm, mesh: Any) -> Skin:
 
     # each facet once, in the order of the numbers of its nodes
     order = np.argsort(nodes, axis=1)
-    nodes, first = np.unique(
-        np.take_along_axis(nodes, order, axis=1), axis=0, return_index=True
-    )
+    nodes, first = np.unique(np.take_along_axis(nodes, order, axis=1), axis=0, return_index=True)
     points = np.take_along_axis(points, order[:, :, None], axis=1)[first]
     normals, tangents = _orient(points, outward[first])
     nodes, points = _turn_round(nodes, points, tangents)
@@ -137,7 +135,7 @@ def gather_skin(comm: Comm, mesh: Any) -> Skin:
         links=links,
         # a chord 2 r of a circle of radius 2 r / turn is off it by r turn / 4
         left_out=0.25 * reach * turn,
-        round_off=ROUND_OFF * float(np.abs(points).max(initial=0.0)),
+        round_off=float(ROUND_OFF) * float(np.abs(points).max(initial=0.0)),
         local=local,
         place=where[own[local]],
         body_of_node=body_of_node,
