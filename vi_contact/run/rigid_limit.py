@@ -43,9 +43,9 @@ class RigidLimit:
 
     Attributes:
         multiplier: lambda; infinite where the live load alone is borne at any size.
-        forces: (m, 2, 2) pressing force and shear at both ends of each joint; they need not be the
-            only ones in equilibrium. The first block has -N n + T t with t = (-n_y, n_x), the second
-            one the opposite.
+        forces: (m, 2, 2) pressing force N and shear T at both ends of each joint; they need not be
+            the only ones in equilibrium. On the first block they are -N n + T t, t = (-n_y, n_x),
+            on the second the opposite.
         velocities: (n, 3) of the blocks, along x, along y and anticlockwise [1/m] about their
             centres; scaled so that the fastest end of a joint or centre has the velocity one.
             Zeros where the multiplier is infinite.

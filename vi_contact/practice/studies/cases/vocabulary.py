@@ -432,6 +432,8 @@ class Parts:
         weighted: it carries its weight, and starts from its equilibrium.
         moved: the excitations come up through its base, and are no inertia load.
         mass: the law of a body without a mesh, or with a layer.
+        tables: how many parts of the surface each [[contact]] has: one, or one for each joint that
+            is found.
     """
 
     system: SemiDiscreteSystem
@@ -440,6 +442,7 @@ class Parts:
     weighted: bool = False
     moved: bool = False
     mass: MassLaw | None = None
+    tables: tuple[int, ...] = ()
 
     @property
     def steady(self) -> bool:
