@@ -91,7 +91,7 @@ def expected(stones: int, courses: int) -> tuple[int, float]:
 @pytest.mark.parametrize("unlike", [0, 5])
 @pytest.mark.parametrize("simplices", [False, True])
 def test_walls_have_their_joints(unlike: int, simplices: bool) -> None:
-    """Every head and bed joint, with its length, whatever the meshes."""
+    """V2.20: every head and bed joint, with its length, whatever the meshes."""
     joints = find(wall_of(5, 6, unlike=unlike, simplices=simplices))
     count, length = expected(5, 6)
     assert len(joints) == count == 77

@@ -57,7 +57,7 @@ def certified(limit: vc.RigidLimit, mu: float) -> None:
 @pytest.mark.parametrize("mu", [0.3, 0.65, 2.0])
 @pytest.mark.parametrize("k", [1, 2, 4])
 def test_a_stack_slides_or_topples(k: int, mu: float) -> None:
-    """tan = min(mu, b/(k h)) for k stones; four of 1 x 0.5 m topple at 0.5."""
+    """V2.21: tan = min(mu, b/(k h)) for k stones; four of 1 x 0.5 m topple at 0.5."""
     limit = vc.rigid_limit_load(stack(k), mu=mu)
     assert limit.multiplier == pytest.approx(min(mu, 1.0 / (k * 0.5)), rel=1e-12)
     certified(limit, mu)
@@ -68,7 +68,7 @@ def test_a_stack_slides_or_topples(k: int, mu: float) -> None:
 
 @pytest.mark.parametrize(("half_first", "multiplier"), [(True, 0.642859), (False, 0.650000)])
 def test_walls_have_the_known_bound(half_first: bool, multiplier: float) -> None:
-    """5 x 6 stones of 0.4 x 0.175 m, mu 0.65, pushed in proportion to weight: half stones in the
+    """V2.21: 5 x 6 stones of 0.4 x 0.175 m, mu 0.65, pushed in proportion to weight: half stones in the
     courses 1, 3, 5, and in 2, 4, 6."""
     limit = vc.rigid_limit_load(wall(half_first), mu=0.65)
     assert limit.multiplier == pytest.approx(multiplier, abs=1e-6)
@@ -130,7 +130,7 @@ def round_arch(n: int, t: float) -> RigidBlocks:
     ids=["straight", "round"],
 )
 def test_arches_stand_down_to_the_known_thickness(make: Any, known: dict[int, float]) -> None:
-    """Milankovitch's 0.1075 of the semicircle is reached from below; halving joints lowers it
+    """V2.22: Milankovitch's 0.1075 of the semicircle is reached from below; halving joints lowers it
     never."""
     found = {n: least_thickness(n, make) for n in known}
     for n, ratio in known.items():
