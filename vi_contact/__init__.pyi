@@ -64,6 +64,8 @@ from .run import Probe as Probe
 from .run import Racking as Racking
 from .run import Reactions as Reactions
 from .run import Resultants as Resultants
+from .run import RigidBlocks as RigidBlocks
+from .run import RigidLimit as RigidLimit
 from .run import Schedule as Schedule
 from .run import SectionForces as SectionForces
 from .run import Solution as Solution
@@ -74,6 +76,8 @@ from .run import march as march
 from .run import march_many as march_many
 from .run import quasi_static as quasi_static
 from .run import read_run as read_run
+from .run import rigid_blocks as rigid_blocks
+from .run import rigid_limit_load as rigid_limit_load
 from .run import simulate as simulate
 from .run import simulate_many as simulate_many
 from .run import static_equilibrium as static_equilibrium

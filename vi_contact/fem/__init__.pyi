@@ -13,7 +13,11 @@ from .body.own_forms import Forms as Forms
 from .body.released_supports import release as release
 from .body.space import bodies_of as bodies_of
 from .body.ties import Tied as Tied
+from .contact.find_joints import contact_pairs as contact_pairs
+from .contact.find_joints import find_joints as find_joints
 from .contact.joined import joined_surfaces as joined_surfaces
+from .contact.joint_list import Joint as Joint
+from .contact.joint_list import Joints as Joints
 from .contact.matching import NodeToNode as NodeToNode
 from .contact.mortar import DualMortar as DualMortar
 from .contact.pairs import contact_pair as contact_pair

@@ -111,7 +111,7 @@ def cut_open(
     side, *numbers = number_alike(sides, *arrays.facet_groups.values())
     numbers_of_group = dict(zip(arrays.facet_groups, numbers, strict=True))
     boundary = numbers_of_group[group]
-    first_twin, second_twin = _find_twins(side)
+    first_twin, second_twin = find_twins(side)
     cut = np.isin(side[first_twin], boundary)
     if cut.sum() < len(np.unique(boundary)):
         raise InputError(
@@ -121,40 +121,67 @@ def cut_open(
     is_first = _tell_first_side(
         arrays, group, owner[first_twin[cut]], owner[second_twin[cut]], inside, towards
     )
-    cells, points = _double_nodes(
+    cells, points = double_nodes(
         arrays, np.unique(facets), sides, owner, first_twin[~cut], second_twin[~cut]
     )
 
-    def renew(rows: Rows, number: Rows, on: Rows) -> Rows:
+    # All other groups keep their facets, each once or, where a cut has parted it, twice.
+    beside = Beside(arrays.cells, cells, owner, side)
+    groups = {}
+    for name, rows in arrays.facet_groups.items():
+        if name != group:
+            groups[name] = beside.renew_group(rows, numbers_of_group[name])
+
+    # The cut boundary becomes two groups, of the cells on either side.
+    side_1 = np.where(is_first, first_twin[cut], second_twin[cut])
+    side_2 = np.where(is_first, second_twin[cut], first_twin[cut])
+    groups[f"{group}_1"] = beside.renew(facets, boundary, side_1)
+    groups[f"{group}_2"] = beside.renew(facets, boundary, side_2)
+    return replace(arrays, points=points, cells=cells, facet_groups=groups)
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """Know the cells beside the sides of cells, before and after nodes were doubled.
+
+    Attributes:
+        before: (n_cells, n_vertices), the cells as they were.
+        after: (n_cells, n_vertices), as they are now.
+        owner: (n_sides,), the cell of each side.
+        side: (n_sides,), the number of each side, equal for the two of one facet.
+    """
+
+    before: Rows
+    after: Rows
+    owner: Rows
+    side: Rows
+
+    def renew(self, rows: Rows, number: Rows, on: Rows) -> Rows:
         """Return facets as the cells beside them know them now.
 
         Args:
             rows: the facets of a group, as it was.
             number: their numbers.
-            on: sides of cells, as rows of ``sides``, on which the facets are wanted.
+            on: sides of cells on which the facets are wanted.
         """
         known, place = np.unique(number, return_index=True)
-        before = rows[place[np.searchsorted(known, side[on])]]
-        match = arrays.cells[owner[on]][:, None, :] == before[:, :, None]
-        return np.asarray(np.take_along_axis(cells[owner[on]], match.argmax(axis=2), axis=1))
+        facets = rows[place[np.searchsorted(known, self.side[on])]]
+        match = self.before[self.owner[on]][:, None, :] == facets[:, :, None]
+        return np.asarray(
+            np.take_along_axis(self.after[self.owner[on]], match.argmax(axis=2), axis=1)
+        )
 
-    # All other groups keep their facets, each once or, where a cut has parted it, twice.
-    groups = {}
-    for name, rows in arrays.facet_groups.items():
-        if name == group:
-            continue
-        number = numbers_of_group[name]
-        renewed = renew(rows, number, np.flatnonzero(np.isin(side, number)))
+    def renew_group(self, rows: Rows, number: Rows) -> Rows:
+        """Return the facets of a group, each once or, where a cut has parted it, twice.
+
+        Args:
+            rows: the facets, as they were.
+            number: their numbers.
+        """
+        renewed = self.renew(rows, number, np.flatnonzero(np.isin(self.side, number)))
         (alike,) = number_alike(renewed)
         _, first_of_each = np.unique(alike, return_index=True)
-        groups[name] = renewed[np.sort(first_of_each)]
-
-    # The cut boundary becomes two groups, of the cells on either side.
-    side_1 = np.where(is_first, first_twin[cut], second_twin[cut])
-    side_2 = np.where(is_first, second_twin[cut], first_twin[cut])
-    groups[f"{group}_1"] = renew(facets, boundary, side_1)
-    groups[f"{group}_2"] = renew(facets, boundary, side_2)
-    return replace(arrays, points=points, cells=cells, facet_groups=groups)
+        return renewed[np.sort(first_of_each)]
 
 
 def _refuse_unclear_sides(
@@ -181,7 +208,7 @@ def _refuse_unclear_sides(
         )
 
 
-def _find_twins(number: Rows) -> tuple[Rows, Rows]:
+def find_twins(number: Rows) -> tuple[Rows, Rows]:
     """Return the places of equal numbers, of which no more than two are alike."""
     order = np.argsort(number, kind="stable")
     inner = np.flatnonzero(np.diff(number[order]) == 0)
@@ -287,7 +314,7 @@ def _make_joint(
         )
     sides, owner = cell_sides(arrays.cells[:, : vertex_count(arrays.cell)], arrays.cell)
     (number,) = number_alike(sides)
-    first_twin, second_twin = _find_twins(number)
+    first_twin, second_twin = find_twins(number)
     forward = first[owner[first_twin]] & second[owner[second_twin]]
     backward = second[owner[first_twin]] & first[owner[second_twin]]
     across = forward | backward
@@ -343,7 +370,7 @@ def _tell_first_side(
     return np.asarray(ahead > 0.0)
 
 
-def _double_nodes(
+def double_nodes(
     arrays: MeshArrays, nodes: Rows, sides: Rows, owner: Rows, first: Rows, second: Rows
 ) -> tuple[Rows, Array]:
     """Give each node a copy for every part of its cells that facets connect.

@@ -88,15 +88,16 @@ def _join_grids(grids: Sequence[Grid], source: str) -> MeshArrays:
     """Return the arrays that `extract` would find in a model of these grids."""
     points_of_grids = []
     cells_of_grids = []
-    facets = {}
+    parts: dict[str, list[Rows]] = {}  # facets of the sides with a name
     first = 0  # number of the first point of a grid
     for grid in grids:
         grid_points, grid_cells, grid_sides = grid.number_nodes()
         points_of_grids.append(grid_points)
         cells_of_grids.append(first + grid_cells)
         for name, rows in grid_sides.items():
-            facets[name] = first + rows
+            parts.setdefault(name, []).append(first + rows)
         first += len(grid_points)
+    facets = {name: np.concatenate(rows) for name, rows in parts.items()}
     points = np.concatenate(points_of_grids)
     cells = np.concatenate(cells_of_grids)
     body = np.repeat(np.arange(len(grids)), [len(part) for part in cells_of_grids])
@@ -106,7 +107,10 @@ def _join_grids(grids: Sequence[Grid], source: str) -> MeshArrays:
     check_cells(points, cells, cell, source)
     check_folds(points, cells, cell, source)
     check_sides(facets, cells, cell, source)
-    groups = {grid.body: body == i for i, grid in enumerate(grids)}
+    groups: dict[str, Mask] = {}
+    for i, grid in enumerate(grids):
+        for name in filter(None, (grid.body, grid.kin)):
+            groups[name] = groups.get(name, False) | (body == i)
     return MeshArrays(cell, points, cells, groups, facets)
 
 

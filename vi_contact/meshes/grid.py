@@ -32,13 +32,16 @@ class Grid:
         nodes: (n_1+1, ..., n_d+1, d) points of the deformed lattice [m].
         simplices: whether boxes are split along a diagonal (Kuhn).
         body: name of all cells.
-        sides: names of the two sides on which each lattice index is lowest and highest.
+        sides: names of the two sides on which each lattice index is lowest and highest; "" for a
+            side without a name. Grids of one mesh may share names of sides.
+        kin: name of a group of cells that the body is in beside its own; "" for none.
     """
 
     nodes: Array
     simplices: bool
     body: str
     sides: Sequence[tuple[str, str]]
+    kin: str = ""
 
     @property
     def kinds(self) -> tuple[int, ...]:
@@ -53,11 +56,13 @@ class Grid:
         number = np.arange(np.prod(shape)).reshape(shape, order="F")
         points = np.empty((number.size, d))
         points[number.reshape(-1)] = self.nodes.reshape(-1, d)
-        faces = {}
+        parts: dict[str, list[npt.NDArray[np.int_]]] = {}
         for axis, (low, high) in enumerate(self.sides):
             for name, end in ((low, 0), (high, -1)):
-                on_side = np.asarray(np.take(number, end, axis=axis))
-                faces[name] = _divide(on_side, self.simplices)
+                if name:
+                    on_side = np.asarray(np.take(number, end, axis=axis))
+                    parts.setdefault(name, []).append(_divide(on_side, self.simplices))
+        faces = {name: np.concatenate(rows) for name, rows in parts.items()}
         return points, _divide(number, self.simplices), faces
 
 
@@ -65,11 +70,16 @@ def add_grids(gmsh: Any, grids: Sequence[Grid]) -> None:
     """Add structured meshes to the current model, as discrete entities with named groups."""
     model = gmsh.model
     first = 1  # tag of the first node of a grid
+    groups: dict[tuple[int, str], list[int]] = {}  # dimension and name -> tags of the entities
     for grid in grids:
         points, cells, faces = grid.number_nodes()
         n, d = points.shape
-        boundary = [_add_entity(model, d - 1, name) for name in faces]
-        volume = _add_entity(model, d, grid.body, boundary)
+        boundary = [model.addDiscreteEntity(d - 1) for _ in faces]
+        volume = model.addDiscreteEntity(d, -1, boundary)
+        for entity, name in zip(boundary, faces, strict=True):
+            groups.setdefault((d - 1, name), []).append(entity)
+        for name in filter(None, (grid.body, grid.kin)):
+            groups.setdefault((d, name), []).append(volume)
         places = np.zeros((n, 3))
         places[:, :d] = points
         model.mesh.addNodes(d, volume, first + np.arange(n), places.reshape(-1))
@@ -77,6 +87,8 @@ def add_grids(gmsh: Any, grids: Sequence[Grid]) -> None:
         for entity, face in zip(boundary, faces.values(), strict=True):
             model.mesh.addElementsByType(entity, grid.kinds[d - 1], [], (first + face).reshape(-1))
         first += n
+    for (dim, name), entities in groups.items():
+        model.setPhysicalName(dim, model.addPhysicalGroup(dim, entities), name)
 
 
 def add_outline(
@@ -114,20 +126,6 @@ def add_outline(
         model.setPhysicalName(1, model.addPhysicalGroup(1, members), group)
     model.setPhysicalName(2, model.addPhysicalGroup(2, [surface]), name)
     return surface
-
-
-def _add_entity(model: Any, dim: int, name: str, boundary: Sequence[int] = ()) -> int:
-    """Add a discrete entity in a group of its own, and return its tag.
-
-    Args:
-        model: Gmsh's current model.
-        dim: dimension of the entity.
-        name: of the group.
-        boundary: tags of the entities that bound it.
-    """
-    entity: int = model.addDiscreteEntity(dim, -1, list(boundary))
-    model.setPhysicalName(dim, model.addPhysicalGroup(dim, [entity]), name)
-    return entity
 
 
 def _divide(tags: npt.NDArray[np.int_], simplices: bool) -> npt.NDArray[np.int_]:

@@ -16,6 +16,10 @@ from .recorders import Racking as Racking
 from .recorders import Reactions as Reactions
 from .recorders import Resultants as Resultants
 from .recorders import SectionForces as SectionForces
+from .rigid_blocks import RigidBlocks as RigidBlocks
+from .rigid_blocks import rigid_blocks as rigid_blocks
+from .rigid_limit import RigidLimit as RigidLimit
+from .rigid_limit import rigid_limit_load as rigid_limit_load
 from .simulate import simulate as simulate
 from .simulate_many import simulate_many as simulate_many
 from .solution import Solution as Solution

@@ -8,4 +8,6 @@ from .records import plot_loop as plot_loop
 from .records import plot_motion as plot_motion
 from .records import plot_spectra as plot_spectra
 from .records import plot_transfer as plot_transfer
+from .stones import plot_joints as plot_joints
+from .stones import plot_mechanism as plot_mechanism
 from .studies import plot_ida as plot_ida

@@ -521,7 +521,8 @@ class Case:
         rising = any(
             node.callee.name == "upgoing" and "motion" not in node.arguments for node in calls
         )
-        return Parts(system, surface, tags, "gravity" in self.nodes, moved=rising)
+        tables = tuple(len(getattr(one, "parts", ())) for one in surfaces)
+        return Parts(system, surface, tags, "gravity" in self.nodes, moved=rising, tables=tables)
 
     def meshed(self, comm: Any) -> tuple[Any, Tags]:
         """Return the mesh and its groups, all those that the tables name among them.
@@ -554,6 +555,7 @@ class Case:
                 self._build_friction(),
                 list_calls(self.nodes.get("contact", ())),
                 parts.surface,
+                parts.tables,
             ),
             impact=self._build_table("impact"),
             mass=self._build_table("mass") or parts.mass,
@@ -731,5 +733,8 @@ def _collect_groups_of_contact(node: Node) -> dict[str, Node]:
     for call in walk_nodes(node):
         if isinstance(call, Call) and "name" in call.arguments:
             keys = call.arguments
-            groups[keys["name"]] = keys.get("facets", keys.get("facets1"))
+            # joints that are found have no group
+            facets = keys.get("facets", keys.get("facets1"))
+            if facets is not None:
+                groups[keys["name"]] = facets
     return groups

@@ -5,6 +5,7 @@ of [friction].
 """
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -46,26 +47,39 @@ def _refuse_other_law(whole: FrictionLaw, contact: Call) -> None:
         )
 
 
-def join_laws(whole: FrictionLaw, contacts: Sequence[Call], surface: ContactSurface) -> FrictionLaw:
+def join_laws(
+    whole: FrictionLaw,
+    contacts: Sequence[Call],
+    surface: ContactSurface,
+    tables: Sequence[int],
+) -> FrictionLaw:
     """Return the law of all contact points, with a value for each where tables differ. Collective.
 
     Args:
         whole: the law of [friction].
         contacts: the tables [[contact]].
         surface: the joined surface, whose conditions are those of one table after the other.
+        tables: how many parts of it each table has.
     """
     if all("mu" not in contact.arguments for contact in contacts):
         return whole
     values = [find_mu(law) or 0.0 for law in list_laws(whole, contacts)]
     if len(set(values)) == 1:
         return Coulomb(values[0])
-    return Coulomb(np.repeat(values, count_points(surface)))
+    return Coulomb(np.repeat(values, count_points(surface, tables)))
 
 
-def count_points(surface: ContactSurface) -> list[int]:
-    """Return how many points of a joined surface each table has on all ranks. Collective."""
+def count_points(surface: ContactSurface, tables: Sequence[int]) -> list[int]:
+    """Return how many points of a joined surface each table has on all ranks. Collective.
+
+    Args:
+        surface: the joined surface.
+        tables: how many parts of it each table has.
+    """
     parts: Sequence[Any] = getattr(surface, "parts", ())
-    return [round(total(surface.comm, len(part.slots))) for part in parts]
+    counts = [round(total(surface.comm, len(part.slots))) for part in parts]
+    ends = np.cumsum(np.array([0, *tables], dtype=int)).tolist()
+    return [sum(counts[first:last]) for first, last in pairwise(ends)]
 
 
 def find_mu(law: FrictionLaw) -> float | None:

@@ -22,6 +22,7 @@ PHRASES = {
     "surface.with_frictionless_corners()": "frictionless_corners = true in every [[contact]]",
     "fem.joined_surfaces": "two [[contact]] tables",
     "contact_pair(…)": '[[contact]] type = "contact_pair"',
+    "contact_pairs(…)": '[[contact]] type = "contact_pairs"',
     "meshes.cut.CutOpen": '[mesh] type = "CutOpen"',
     "fem.InitialStrain": '[[system.loads]] type = "InitialStrain"',
     "quasi_static on surface.moving(towards=…)": "in Python by quasi_static, with a moving surface",

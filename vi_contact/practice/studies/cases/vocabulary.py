@@ -215,6 +215,33 @@ def pair(
     return result.bilateral_everywhere() if roller else result
 
 
+@check_arguments
+def pairs(
+    system: SemiDiscreteSystem,
+    *,
+    within: Annotated[float, NotNegative, Unit("m")] = 0.0,
+    between: Sequence[Cells] | None = None,
+    matching: Matching | None = None,
+    frictionless_corners: bool = False,
+    mu: FrictionCoefficient | None = None,
+    name: str = "",
+) -> ContactSurface:
+    """Make ``contact_pairs`` of all bodies that touch; the others: as of ``surface``.
+
+    Args:
+        system: of the bodies.
+        within: largest gap of a joint [m].
+        between: one group of whole bodies, or two; None: all bodies.
+        matching: how side 1 of a joint finds side 2; None: ``NodeToNode()`` where facets of both
+            are the same, ``DualMortar()`` elsewhere.
+        frictionless_corners: as of ``surface``.
+        mu: as of ``surface``.
+        name: as of ``surface``.
+    """
+    result = fem.contact_pairs(system, within=within, between=between, matching=matching)
+    return result.with_frictionless_corners() if frictionless_corners else result
+
+
 def weight(
     system: SemiDiscreteSystem,
     *,
@@ -405,6 +432,8 @@ class Parts:
         weighted: it carries its weight, and starts from its equilibrium.
         moved: the excitations come up through its base, and are no inertia load.
         mass: the law of a body without a mesh, or with a layer.
+        tables: how many parts of the surface each [[contact]] has: one, or one for each joint that
+            is found.
     """
 
     system: SemiDiscreteSystem
@@ -413,6 +442,7 @@ class Parts:
     weighted: bool = False
     moved: bool = False
     mass: MassLaw | None = None
+    tables: tuple[int, ...] = ()
 
     @property
     def steady(self) -> bool:
@@ -426,7 +456,11 @@ _FUNCTIONS: Mapping[Any, Mapping[str, Callable[[], Any]]] = {
     Dashpots: {"CompliantBase": lambda: compliant_base, "FreeField": lambda: free_field},
     CompliantBase: {"CompliantBase": lambda: compliant_base},
     UpgoingVelocity: {"upgoing": lambda: upgoing},
-    ContactSurface: {"contact_surface": lambda: surface, "contact_pair": lambda: pair},
+    ContactSurface: {
+        "contact_surface": lambda: surface,
+        "contact_pair": lambda: pair,
+        "contact_pairs": lambda: pairs,
+    },
     ImpactLaw: {"Elastic": lambda: laws.Elastic},
     Record: {"read_record": lambda: record, "synthetic": lambda: ground_motion.synthetic},
     DesignSpectrum: design_spectra.CHOICES,

@@ -45,11 +45,17 @@ def _describe_support(
 
 
 def describe_contact(
-    case: Any, problem: ContactProblem, tags: Mapping[str, Any]
+    case: Any, problem: ContactProblem, tags: Mapping[str, Any], joints: Sequence[int]
 ) -> Iterator[dict[str, Any]]:
     """Yield the parts of the contact, one for each table; collective.
 
     Each goes by its name, or by those of its groups.
+
+    Args:
+        case: the case.
+        problem: its problem.
+        tags: groups of the mesh.
+        joints: how many parts of the surface each table has.
     """
     surface = problem.surface
     tables = case.nodes.get("contact", ())
@@ -57,14 +63,15 @@ def describe_contact(
 
     # The points of the whole surface, on all ranks, are those of one table after the other.
     whole = surface.whole()
-    parts = getattr(surface, "parts", ())
-    ends = np.cumsum([0, *count_points(surface)])
+    ends = np.cumsum([0, *count_points(surface, joints)])
+    firsts = np.cumsum([0, *joints])
     laws = case.list_friction()
     for number, (node, (a, b)) in enumerate(zip(nodes, pairwise(ends), strict=True)):
         groups = [inner.name for inner in walk_nodes(node) if isinstance(inner, Group)]
-        census = surface.censuses[number] if len(surface.censuses) == len(parts) else None
+        known = joints[number] == 1 and len(surface.censuses) == firsts[-1]
+        census = surface.censuses[firsts[number]] if known else None
         yield {
-            "name": node.arguments.get("name") or " on ".join(groups),
+            "name": node.arguments.get("name") or " on ".join(groups) or "all joints",
             "points": int(b - a),
             "size": float(whole.weights[a:b].sum()),
             "gaps": _find_gaps(whole.gap0[a:b]),

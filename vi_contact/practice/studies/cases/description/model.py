@@ -4,7 +4,7 @@ This is what ``run --check`` tells and model.json holds.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -79,7 +79,7 @@ def describe(
         "method": case.describe_method(problem),
         "outline": body["outline"],
     }
-    model |= _describe_contact(case, problem, tags)
+    model |= _describe_contact(case, problem, tags, parts.tables)
     model |= _describe_actions(case, problem, tags, run["t_end"])
     model |= _describe_motions(case, parts)
     model |= _describe_modes(case, problem, most)
@@ -92,10 +92,19 @@ def describe(
     return dict(json.loads(text, parse_float=lambda digits: float(f"{float(digits):.{DIGITS}g}")))
 
 
-def _describe_contact(case: Any, problem: ContactProblem, tags: Any) -> dict[str, Any]:
-    """Return the parts of the contact; collective."""
+def _describe_contact(
+    case: Any, problem: ContactProblem, tags: Any, tables: Sequence[int]
+) -> dict[str, Any]:
+    """Return the parts of the contact; collective.
+
+    Args:
+        case: the case.
+        problem: its problem.
+        tags: groups of the mesh.
+        tables: how many parts of the surface each [[contact]] has.
+    """
     if case.body is None:
-        return {"contact": list(describe_contact(case, problem, tags))}
+        return {"contact": list(describe_contact(case, problem, tags, tables))}
     return {"contact": [describe_contact_point(case.body, problem)]}
 
 
