@@ -278,7 +278,9 @@ class NonlinearSolver:
             share: of K, in the place of as much of the tangent.
         """
         system = self._system
-        rows = self._problem.surface.owned[closed]
+        surface = self._problem.surface
+        # Conditions that are traces have no unknown to brace: their closed points may move together.
+        rows = surface.owned[closed] if surface.traces is None else surface.owned[:0]
         springs = BRACE * np.abs(system.K.diagonal()[rows])
         brace = system.algebra.local(rows, rows, springs, system.rows)
         return system.algebra.combine([(1.0 - share, tangent), (share, system.K), (1.0, brace)])

@@ -29,7 +29,7 @@ from ..body.space import FemSpace
 from ..mesh.numbering import facet_rows
 from ..mesh.tagged_mesh import Facets
 from .faces import outward_normals
-from .frames import Facing
+from .conditions import Facing
 from .nodes import Nodes, Rows
 
 POINTS = 5  # of a rule in every direction: exact for degree 8 on flat facets
