@@ -120,7 +120,7 @@ def test_two_bars_exchange_their_speeds():
 
 def test_corner_of_two_oblique_walls():
     """A mass on springs is pressed into a corner of 60°: it stays, and the two reactions are the
-    force's components."""
+    force's components; with friction the least forces of both walls that add up to it."""
     way = np.array([[1.0, 0.0], [0.5, np.sqrt(0.75)]])
     force = np.array([3.0, 2.0])
     system = vc.system_from_arrays(
@@ -129,8 +129,21 @@ def test_corner_of_two_oblique_walls():
     surface = vc.contact_points(system, [0, 0], way)
     state = vc.static_equilibrium(vc.ContactProblem(system, surface))
     assert state.r_n == pytest.approx(np.linalg.solve(way.T, force), rel=1e-12)
-    with pytest.raises(InputError, match="several contact directions, and friction on two faces"):
-        vc.ContactProblem(system, surface, friction=vc.Coulomb(0.3))
+    mu = 0.3
+    problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(mu))
+    state = vc.static_equilibrium(problem)
+    across = np.column_stack([-way[:, 1], way[:, 0]])
+    assert state.r_n @ way + state.r_t[:, 0] @ across == pytest.approx(force, rel=1e-12)
+    assert np.abs(state.u).max() < 1e-15
+    assert np.all(np.abs(state.r_t[:, 0]) <= mu * state.r_n * (1.0 + 1e-12))
+    # the least of the wanted splits, by hand: without bounds each wall would carry half of it, of
+    # which the second wall's limit leaves r_t = -mu r_n there
+    half = way @ force / 2.0
+    assert abs(across[1] @ force / 2.0) > mu * half[1]
+    edge = way[1] - mu * across[1] if across[1] @ force < 0.0 else way[1] + mu * across[1]
+    grown = edge @ force / (1.0 + edge @ edge)  # least |force - a edge|² + a² |edge|²
+    if abs(across[0] @ (force - grown * edge)) <= mu * (way[0] @ (force - grown * edge)):
+        assert state.r_n[1] == pytest.approx(grown, rel=1e-9)
 
 
 # Rotations
@@ -490,7 +503,7 @@ def test_bad_matrices(given, said):
         ({"gap0": -1e-3}, "penetrates its obstacle by 0.001 m"),
         ({"obstacle": vc.Touching(), "gap0": 0.1}, "the obstacle gives the gaps"),
         ({"obstacle": vc.HalfSpace((0.0, -1.0), (0.0, -1.0))}, "points into the body"),
-        ({"opposite": [6]}, "side 1 of one contact pair and on side 2"),
+        ({"opposite": [6]}, "contact node .* faces itself: give each pair once"),
         ({"nodes": [0]}, "is also prescribed along its contact direction"),
         ({"nodes": [6, 6]}, "several contact surfaces with one contact direction"),
     ],

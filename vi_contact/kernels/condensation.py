@@ -27,6 +27,8 @@ from ..core.surfaces import ContactSurface
 from ..core.traces import Traces
 from .contact_last import ContactLast
 
+ROUNDING = 2e-15  # of the largest free motion, as sums of reactions leave it
+
 
 def condense(
     A: EffectiveMatrix, surface: ContactSurface, *, frictional: bool = False
@@ -231,7 +233,6 @@ class CondensedTraces:
             self._unknowns: CondensedLast | CondensedTwice = twice
         else:
             self._unknowns = CondensedLast(factor, everything)
-        self._nothing = np.zeros(len(everything), dtype=bool)
         self.movable: Mask = np.diff(B.indptr) > 0
 
         # G = B C Bᵀ, as symmetric as C.
@@ -241,19 +242,24 @@ class CondensedTraces:
 
     def find_free_motion(self, b: Array) -> Array:
         """Return B A⁻¹b, and keep b for ``answer``. Collective."""
-        return np.asarray(self._B @ self._unknowns.find_free_motion(b))
+        self._free = self._unknowns.find_free_motion(b)
+        return np.asarray(self._B @ self._free)
 
     def answer(self, r: Array, held: Mask, values: Array) -> Array:
         """Return x = A⁻¹(b - Bᵀr), owned rows. Collective.
 
-        A trace is no unknown that could be put on a value: rounding stays.
+        A trace is no unknown that could be put on a value: rounding stays. Unknowns that reactions
+        bring to rest but for rounding are zero.
 
         Args:
             r: reactions of the conditions, in the unit of b.
             held: is not read.
             values: is not read.
         """
-        return self._unknowns.answer(self._Bt @ r, self._nothing, np.zeros(len(self._nothing)))
+        force = self._Bt @ r
+        x = self._free - self._unknowns.flexibility @ force
+        still = np.abs(x) <= ROUNDING * np.abs(self._free).max(initial=0.0)
+        return self._unknowns.answer(force, still, np.zeros(len(still)))
 
     def respond(self, r: Array) -> Array:
         """Return A⁻¹ Bᵀ r, owned rows, of reactions r. Collective."""

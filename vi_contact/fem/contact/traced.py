@@ -15,9 +15,9 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.sparse as sp
 
-from ...core.algebra import Array, Indices, Mask, largest
+from ...core.algebra import Array, Indices, Mask, from_each, largest
 from ...core.checks import describe_point
-from ...core.corners import PARALLEL, make_tangent_vectors
+from ...core.corners import FEATURE_ANGLE, PARALLEL, make_tangent_vectors
 from ...core.errors import InputError
 from ...core.surfaces import group_same_nodes
 from ...core.traces import Traces, make_traces
@@ -90,6 +90,43 @@ def refuse_twice(
                 )
 
 
+def _refuse_both_ways(space: NodalSpace, parts: Sequence[NodalConditions]) -> None:
+    """Raise InputError for nodes of which each faces the other: pairs that are given both ways.
+
+    Two bodies that meet at an edge may face one another along different directions. Collective.
+
+    Args:
+        space: what the unknowns mean.
+        parts: this rank's conditions.
+    """
+    # every node and what it faces, with the direction and the place
+    rows = [np.zeros((0, 2 + 2 * space.dimension))]
+    for part in parts:
+        if part.facing is None:
+            continue
+        P = part.facing.P
+        of = np.repeat(np.arange(len(part.nodes.numbers)), np.diff(P.indptr))
+        faced = part.facing.nodes.numbers[P.indices]
+        own = (part.nodes.numbers[of], faced, part.directions[of], part.nodes.points[of])
+        rows.append(np.column_stack(own))
+    every = np.concatenate(from_each(space.comm, np.concatenate(rows)))
+    pairs = every[:, :2].astype(np.int64)
+    d = space.dimension
+    known = {(s, j): row for row, (s, j) in enumerate(pairs.tolist())}
+    for row, (s, j) in enumerate(pairs.tolist()):
+        back = known.get((j, s))
+        if back is None:
+            continue
+        slope = float(every[row, 2 : 2 + d] @ every[back, 2 : 2 + d])
+        if s == j or slope < -np.cos(FEATURE_ANGLE):
+            where = describe_point(every[row, 2 + d :])
+            what = "itself" if s == j else "a node of another contact pair that faces it"
+            raise InputError(
+                f"contact node {where} faces {what}: give each pair once, with either side the "
+                "first"
+            )
+
+
 def _find_parallel(directions: Array, rows: Indices) -> list[tuple[int, int]]:
     """Return the pairs of rows with the same direction."""
     cosines = directions[rows] @ directions[rows].T
@@ -129,7 +166,8 @@ def trace_conditions(
         slots: (m,) their numbers among those of all ranks.
 
     Raises:
-        InputError: on all ranks, a node that faces the same twice along one direction.
+        InputError: on all ranks, a node that faces the same twice along one direction, or itself,
+            and nodes that face one another.
     """
     nodes = join_nodes([part.nodes for part in parts])
     directions = np.concatenate([part.directions for part in parts])
@@ -140,6 +178,7 @@ def trace_conditions(
         return ()
 
     ask_alike(space.comm, slots, ask, nodes.numbers, nodes.points, directions, partners)
+    _refuse_both_ways(space, parts)
     tangents, free = find_own_tangents(parts)
     tangents = np.where(free[:, None, :], tangents, 0.0)
 
