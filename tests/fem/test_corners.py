@@ -707,7 +707,8 @@ def test_a_pair_that_bends_round_corners(matching):
     found = [vc.static_equilibrium(problem) for problem in frictional]
     for name in ("r_n", "r_t"):
         r, expected = (
-            seen(s).all(getattr(state, name)) for s, state in zip((one, several), found, strict=True)
+            seen(s).all(getattr(state, name))
+            for s, state in zip((one, several), found, strict=True)
         )
         assert np.abs(r[a] - expected[b]).max() < 1e-9 * np.abs(found[0].r_n).max()
 

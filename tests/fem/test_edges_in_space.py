@@ -745,8 +745,8 @@ def test_refused_pairs():
         "pair once, and join boundaries that continue one another": lambda: joined_surfaces(
             pair(part(upper, "left", 0.0, 0.9), lower), pair(part(upper, "right", 0.9, 1.5), lower)
         ),
-        "faces a node of another contact pair that faces it: give each pair once": lambda: joined_surfaces(
-            pair(upper, lower), pair(lower, upper)
+        "faces a node of another contact pair that faces it: give each pair once": lambda: (
+            joined_surfaces(pair(upper, lower), pair(lower, upper))
         ),
     }
     for sentence, ask in cases.items():

@@ -136,14 +136,15 @@ def test_corner_of_two_oblique_walls():
     assert state.r_n @ way + state.r_t[:, 0] @ across == pytest.approx(force, rel=1e-12)
     assert np.abs(state.u).max() < 1e-15
     assert np.all(np.abs(state.r_t[:, 0]) <= mu * state.r_n * (1.0 + 1e-12))
-    # the least of the wanted splits, by hand: without bounds each wall would carry half of it, of
-    # which the second wall's limit leaves r_t = -mu r_n there
-    half = way @ force / 2.0
-    assert abs(across[1] @ force / 2.0) > mu * half[1]
-    edge = way[1] - mu * across[1] if across[1] @ force < 0.0 else way[1] + mu * across[1]
-    grown = edge @ force / (1.0 + edge @ edge)  # least |force - a edge|² + a² |edge|²
-    if abs(across[0] @ (force - grown * edge)) <= mu * (way[0] @ (force - grown * edge)):
-        assert state.r_n[1] == pytest.approx(grown, rel=1e-9)
+    # the least split, by a search over what balances: r = (n1, t1, n2, t2) with two ways free
+    B = np.stack([way, across], axis=1).reshape(4, 2)
+    found = np.column_stack([state.r_n, state.r_t]).ravel()
+    free = np.linalg.svd(B.T)[2][2:]
+    steps = np.linspace(-1.0, 1.0, 401)
+    tried = found + 1e-2 * (steps[:, None, None] * free[0] + steps[None, :, None] * free[1])
+    allowed = np.all(np.abs(tried[..., 1::2]) <= mu * tried[..., ::2], axis=-1)
+    sizes = np.linalg.norm(tried, axis=-1)
+    assert allowed.any() and sizes[allowed].min() >= np.linalg.norm(found) * (1.0 - 1e-12)
 
 
 # Rotations

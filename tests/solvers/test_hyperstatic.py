@@ -1,4 +1,5 @@
-"""Small problems whose conditions share unknowns: against all states of one node, and their split."""
+"""Small problems whose conditions share unknowns: against all states of one node, and the split of
+forces over rings."""
 
 import numpy as np
 import pytest
@@ -8,7 +9,6 @@ from vi_contact.core.algebra import Array
 from vi_contact.solvers.friction.enumeration import list_answers
 from vi_contact.solvers.friction.hyperstatic import Hyperstatic
 from vi_contact.solvers.friction.newton import FrictionNewton
-from vi_contact.solvers.friction.nsgs import NSGS
 from vi_contact.solvers.friction.rings import find_rings
 
 # name -> normals [degrees] and the two bodies of each condition, -1 for a wall
@@ -80,16 +80,19 @@ class Node:
         return self.free - self.C @ self.B.T @ r.ravel()
 
 
-@pytest.mark.parametrize(("kind", "mu", "count"), [
-    ("two walls", 0.5, 60),
-    ("two walls", 1.5, 60),
-    ("three walls", 0.5, 40),
-    ("three walls", 1.5, 40),
-    ("two partners", 1.5, 60),
-    ("three partners", 0.7, 40),
-    ("ring", 0.7, 40),
-    ("crossing", 0.7, 10),
-])
+@pytest.mark.parametrize(
+    ("kind", "mu", "count"),
+    [
+        ("two walls", 0.5, 60),
+        ("two walls", 1.5, 60),
+        ("three walls", 0.5, 40),
+        ("three walls", 1.5, 40),
+        ("two partners", 1.5, 60),
+        ("three partners", 0.7, 40),
+        ("ring", 0.7, 40),
+        ("crossing", 0.7, 10),
+    ],
+)
 def test_all_states_of_a_node(kind, mu, count):
     """Every answer is one of those that the enumeration of all states finds."""
     for seed in range(count):

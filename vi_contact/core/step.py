@@ -13,9 +13,10 @@ by two so that K has the factor one in A, and dt for impulses in N s.
 
 Vectors are arrays of the unknowns that this rank owns, in the rotated basis: there B_n and B_t
 select entries, as the normal and the tangential displacements of a contact node are unknowns
-themselves; where conditions share unknowns they are traces (``core.traces``). Contact arrays have shape (m,) or, tangential ones, (m, d - 1), a row for each condition
-on these unknowns; r_t is None without friction. Branch on them with ``surface.some``, which asks
-all ranks: what follows may be collective.
+themselves; where conditions share unknowns they are traces (``core.traces``). Contact arrays have
+shape (m,) or, tangential ones, (m, d - 1), a row for each condition on these unknowns; r_t is None
+without friction. Branch on them with ``surface.some``, which asks all ranks: what follows may be
+collective.
 
 The loop (``run.march``) calls, for every step, in this order:
 

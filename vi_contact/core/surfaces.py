@@ -3,10 +3,11 @@
 A contact condition bounds one unknown: after the change of basis u = T û (nodal frames turned to
 the contact direction) the normal displacement u_n of a contact point *is* an entry of û, and B_n is
 a selection of entries. Where conditions share unknowns, as those of a stone on two stones do, B_n
-is a matrix of any entries (``core.traces``), and the basis is that of the system. Contact arrays (bounds, reactions, active sets, slips) have one row for
-every condition of this rank, and none of another's: what is asked of all of them (``some``,
-``everywhere``) is asked on all ranks. Sign: the direction n points from the body to the obstacle,
-u_n = u·n, gap = gap0 - u_n >= 0, reaction r_n >= 0.
+is a matrix of any entries (``core.traces``), and the basis is that of the system. Contact arrays
+(bounds, reactions, active sets, slips) have one row for every condition of this rank, and none of
+another's: what is asked of all of them (``some``, ``everywhere``) is asked on all ranks. Sign: the
+direction n points from the body to the obstacle, u_n = u·n, gap = gap0 - u_n >= 0, reaction r_n >=
+0.
 
 ``ContactSurface`` is a value: its methods read it, or return another surface (``moving``,
 ``on_springs``, …). Below it stand the frames that T is made of: ``make_nodal_frames`` gives every

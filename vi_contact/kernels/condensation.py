@@ -28,6 +28,7 @@ from ..core.traces import Traces
 from .contact_last import ContactLast
 
 ROUNDING = 2e-15  # of the largest free motion, as sums of reactions leave it
+AT_REST = 1e-12  # the same of all unknowns at once
 
 
 def condense(
@@ -258,7 +259,10 @@ class CondensedTraces:
         """
         force = self._Bt @ r
         x = self._free - self._unknowns.flexibility @ force
-        still = np.abs(x) <= ROUNDING * np.abs(self._free).max(initial=0.0)
+        # Where all are at rest what is left of them is rounding of the method too.
+        size = np.abs(self._free).max(initial=0.0)
+        is_at_rest = np.abs(x).max(initial=0.0) <= AT_REST * size
+        still = np.abs(x) <= (AT_REST if is_at_rest else ROUNDING) * size
         return self._unknowns.answer(force, still, np.zeros(len(still)))
 
     def respond(self, r: Array) -> Array:

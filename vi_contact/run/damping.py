@@ -141,7 +141,8 @@ def _assemble_closed(problem: ContactProblem, closed: Mask) -> tuple[Matrix, Mat
 
     The system is that of the nodal frames, without excitation. A closed condition on a rigid
     support takes its unknown out, and with friction the tangential ones too (sticking); one on a
-    spring adds 1 / compliance to K_ii. Traces have no unknowns to take out: stiff springs hold them.
+    spring adds 1 / compliance to K_ii. Traces have no unknowns to take out: stiff springs hold
+    them.
 
     Args:
         problem: whose matrices they are.

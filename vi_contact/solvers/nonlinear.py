@@ -279,7 +279,7 @@ class NonlinearSolver:
         """
         system = self._system
         surface = self._problem.surface
-        # Conditions that are traces have no unknown to brace: their closed points may move together.
+        # Traces have no unknown to brace: their closed points may move together.
         rows = surface.owned[closed] if surface.traces is None else surface.owned[:0]
         springs = BRACE * np.abs(system.K.diagonal()[rows])
         brace = system.algebra.local(rows, rows, springs, system.rows)

@@ -324,9 +324,7 @@ def _refuse_several(side1: Side, side2: Side, row: int) -> None:
     mortar = "matching=DualMortar()"
     if max(side1.facets.shape[1], side2.facets.shape[1]) > (2 if d == 2 else 4):
         mortar = f"degree=1 and {mortar}"
-    raise InputError(
-        f"{where}, which have no facets of their own in front of it: use {mortar}"
-    )
+    raise InputError(f"{where}, which have no facets of their own in front of it: use {mortar}")
 
 
 def refuse_same_way(name1: str, name2: str, point: Array) -> None:

@@ -39,11 +39,14 @@ class Surface:
         corners = self.around(node)
         edges = corners[:, 1:] - corners[:, :1]
         if corners.shape[2] == 3:
-            # Triangles and quadrilaterals, whose vertices are in the order of tensor products.
-            across = np.cross(edges[:, 0], edges[:, 1])
-            if corners.shape[1] == 4:
-                across = across + np.cross(edges[:, 2] - edges[:, 0], edges[:, 2] - edges[:, 1])
-            return np.linalg.norm(across, axis=1)
+            areas = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+            if corners.shape[1] != 4:
+                return areas
+            # Of quadrilaterals, in any order of their vertices: the diagonals span the most.
+            for i, j, k in ((0, 1, 2), (1, 0, 2), (2, 0, 1)):
+                across = np.cross(edges[:, i], edges[:, k] - edges[:, j])
+                areas = np.maximum(areas, np.linalg.norm(across, axis=1))
+            return areas
         if edges.shape[1] == 0:
             return np.ones(len(corners))
         return np.asarray(np.linalg.norm(edges, axis=2).max(axis=1))

@@ -34,6 +34,7 @@ from ..mesh.group_checks import facets_of
 from ..mesh.tagged_mesh import Facets
 from .borrowing import borrow
 from .bubbles import average_bubbles
+from .conditions import NodalConditions, list_faced
 from .counting import census_on_ranks, tell
 from .faces import (
     check_angle,
@@ -43,7 +44,6 @@ from .faces import (
     split_at_corners,
     tell_corners,
 )
-from .conditions import NodalConditions, list_faced
 from .frames import FemSurface, NodalFrames, gather_frame_data, snap_to_axes, surface_of
 from .hinges import gather_points, mark_hinges, refuse_hinges
 from .matching import EDGE_ON

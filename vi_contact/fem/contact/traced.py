@@ -153,9 +153,7 @@ def _list_partners(parts: Sequence[NodalConditions]) -> list[frozenset[int]]:
     return partners
 
 
-def trace_conditions(
-    space: NodalSpace, parts: Sequence[NodalConditions], slots: Indices
-) -> Traces:
+def trace_conditions(space: NodalSpace, parts: Sequence[NodalConditions], slots: Indices) -> Traces:
     """Return B_n and B_t of conditions, one part after the other. Collective.
 
     A tangent along which the node itself is prescribed is no tangent: it carries no friction.
@@ -210,9 +208,7 @@ def find_own_tangents(parts: Sequence[NodalConditions]) -> tuple[Array, Mask]:
     return tangents, ~stopped.any(axis=1)
 
 
-def _express(
-    space: NodalSpace, parts: Sequence[NodalConditions], vectors: Array
-) -> sp.csr_matrix:
+def _express(space: NodalSpace, parts: Sequence[NodalConditions], vectors: Array) -> sp.csr_matrix:
     """Return rows (m, unknowns) of vector·(u_s - what s faces), for m vectors (m, d)."""
     rows = []
     start = 0
@@ -246,5 +242,3 @@ def _select(unknowns: Indices, vectors: Array, total: int) -> sp.csr_matrix:
     used = (unknowns >= 0) & (vectors != 0.0)
     row = np.broadcast_to(np.arange(k)[:, None], used.shape)
     return sp.csr_matrix((vectors[used], (row[used], unknowns[used])), shape=(k, total))
-
-

@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import numpy as np
 
 from ...core.algebra import Array, Indices, from_each, on_first
-from ...core.corners import find_tangents
 from ...core.arguments import check_fields
 from ...core.checks import column_name
+from ...core.corners import find_tangents
 from ...core.errors import InputError
 from ...core.files import (
     FIELDS,

@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...core.algebra import Array, Mask, total
-from ...core.corners import find_tangents
 from ...core.arguments import check_fields
+from ...core.corners import find_tangents
 from ...core.problem import ContactProblem
 from ...core.step import AXES, Columns, Report, Row, State, find_slipping
 from ...core.surfaces import ContactSurface

@@ -2,10 +2,10 @@
 
 Displacements and total forces are unique for given limits all the same (``rings``). The steps are
 
-1. a moving shift: any method solves with  G + δ D,  q - δ D r_before,  D the diagonal of G, and
-   again with the new r. Where r does not change any more the shift has no effect, and the answer is
-   that of G itself. This is the proximal point method (Rockafellar, SIAM J. Control Optim. 14,
-   1976);
+1. a moving shift: any method solves with  G + σ Z Zᵀ,  q - σ Z Zᵀ r_before,  Z the forces without
+   effect, and again with the new r. Where r does not change any more the shift has no effect, and
+   the answer is that of G itself. This is the proximal point method (Rockafellar, SIAM J. Control
+   Optim. 14, 1976), in the directions alone in which G says nothing;
 2. Gauss-Seidel sweeps by conditions where a method fails, ever more, and the shift from there;
 3. in the plane, with few conditions, all their states one after another (``enumeration``);
 4. the least of all splits over each ring (``least_forces``).
@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.algebra import Array, Mask
+from ...core.algebra import Array, Mask, max_abs
 from ...core.errors import StepFailure
 from .enumeration import MOST_CONDITIONS, find_by_states
 from .least_forces import States, split_least
@@ -24,7 +24,7 @@ from .nsgs import make_sweep
 from .problem import STILL, FrictionMethod, FrictionResult, ScaledDelassus, ScaledProblem
 from .rings import Ring
 
-SHIFT = 1e-5  # δ: larger takes more passes, smaller leaves fewer digits to the method
+SHIFT = 1e-3  # σ over what conditions give way alone: larger takes more passes, smaller more digits
 PASSES = 30
 SLOW = 0.5  # a pass that leaves more of the residual has reached rounding
 TOLERANCE = 1e-8  # of the residual of r = 0, above which an answer is refused; passes go on below
@@ -60,10 +60,30 @@ class Hyperstatic:
         self._delassus = ScaledDelassus(G, bilateral, unsymmetric=True)
         m = len(bilateral)
         self._movable = movable.reshape(m, -1)
-        self._shift = np.zeros(self._movable.shape)
+        self._strength = 0.0
         if rings:
-            self._shift = SHIFT * np.diag(G).reshape(m, -1)
-        self._small: Any = method.prepare(G + np.diag(self._shift.ravel()), bilateral)
+            # What conditions give way while all others are held, as springs in series with them.
+            largest = self._add_shift(G, max_abs(G))
+            alone = 1.0 / np.diag(np.linalg.inv(largest))
+            self._strength = SHIFT * float(np.median(alone[movable]))
+        self._small: Any = method.prepare(self._add_shift(G, self._strength), bilateral)
+
+    def _add_shift(self, G: Array, strength: float) -> Array:
+        """Return G + strength Z Zᵀ, a copy."""
+        shifted = G.copy()
+        for ring in self._rings:
+            places = ring.places(self._movable.shape[1])
+            shifted[np.ix_(places, places)] += strength * ring.null @ ring.null.T
+        return shifted
+
+    def _shift(self, r: Array) -> Array:
+        """Return σ Z Zᵀ r (m, d) of reactions (m, d)."""
+        shift = np.zeros(r.size)
+        flat = r.ravel()
+        for ring in self._rings:
+            places = ring.places(r.shape[1])
+            shift[places] = self._strength * (ring.null @ (ring.null.T @ flat[places]))
+        return shift.reshape(r.shape)
 
     def solve(
         self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None
@@ -82,7 +102,7 @@ class Hyperstatic:
         step = self._delassus.problem(q, cohesion, slope)
 
         def solve_shifted(before: Array, start: Array | Mask | None) -> FrictionResult:
-            moved = q - self._shift * before
+            moved = q - self._shift(before)
             found: FrictionResult = self._small.solve(moved, cohesion, slope, start)
             return found
 

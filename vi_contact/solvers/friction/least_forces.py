@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.algebra import Array, Indices, Mask, max_abs
-from .rings import DEPENDENT, Ring
+from .rings import DEPENDENT, Ring, find_null_space
 
 CUTS = 60  # half planes of one disk, at most; each brings the answer nearer by its square
 TINY = 1e-300  # in the place of the size of traces that are all zero
@@ -86,7 +86,7 @@ def split_least(r: Array, ring: Ring, states: States, weights: Array, movable: M
             row = identity[places[i, 1 + k]].copy()
             row[places[i, 0]] -= states.slope[i] * states.slip[i, k]
             fixed.append(row[None])
-    Z = _find_null_space(np.vstack(fixed))
+    Z = find_null_space(np.vstack(fixed))
     if Z.shape[1] == 0:
         return r
 
@@ -171,10 +171,3 @@ def _find_least(a: Array, b: Array, y0: Array) -> Array:
     edges = a[on_edge]
     t = np.linalg.lstsq(edges, h[on_edge], rcond=DEPENDENT)[0]
     return np.asarray(t - y0)
-
-
-def _find_null_space(matrix: Array) -> Array:
-    """Return orthonormal columns (n, z) on which a matrix (k, n) is zero."""
-    _, values, vectors = np.linalg.svd(matrix)
-    rank = int(np.sum(values > DEPENDENT * values.max(initial=0.0)))
-    return np.asarray(vectors[rank:].T)

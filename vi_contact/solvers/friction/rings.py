@@ -24,10 +24,16 @@ class Ring:
     Attributes:
         conditions: (c,) their rows among all conditions.
         B: (c d, u) their traces of the unknowns that they read, a condition's side by side.
+        null: (c d, z) orthonormal forces without effect: Bᵀ null = 0.
     """
 
     conditions: Indices
     B: Array
+    null: Array
+
+    def places(self, width: int) -> Indices:
+        """Return where the rows of these conditions stand among all, ``width`` of each."""
+        return np.asarray((self.conditions[:, None] * width + np.arange(width)).ravel())
 
 
 def find_rings(B: sp.csr_matrix, movable: Mask, width: int) -> list[Ring]:
@@ -55,7 +61,18 @@ def find_rings(B: sp.csr_matrix, movable: Mask, width: int) -> list[Ring]:
         part = B[rows]
         unknowns = np.unique(part.indices)
         dense = part[:, unknowns].toarray()
-        values = np.linalg.svd(dense[moves], compute_uv=False)
-        if np.sum(values > DEPENDENT * values.max(initial=0.0)) < np.count_nonzero(moves):
-            rings.append(Ring(conditions, dense))
+        null = np.zeros((len(rows), 0))
+        if moves.any():
+            columns = find_null_space(dense[moves].T)
+            null = np.zeros((len(rows), columns.shape[1]))
+            null[moves] = columns
+        if null.shape[1]:
+            rings.append(Ring(conditions, dense, null))
     return rings
+
+
+def find_null_space(matrix: Array) -> Array:
+    """Return orthonormal columns (n, z) on which a matrix (k, n) is zero."""
+    _, values, vectors = np.linalg.svd(matrix)
+    rank = int(np.sum(values > DEPENDENT * values.max(initial=0.0)))
+    return np.asarray(vectors[rank:].T)
