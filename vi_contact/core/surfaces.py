@@ -224,6 +224,11 @@ class ContactSurface:
         return () if self.nodes is None else group_same_nodes(self.nodes)
 
     @property
+    def alone(self) -> Mask:
+        """Return which conditions (m,) have the tangents of their own direction alone: traces."""
+        return np.full(self.count, self.traces is not None)
+
+    @property
     def frame_nodes(self) -> Indices | None:
         """Return the nodes (m,) whose frames hold the tangents of all their conditions.
 
