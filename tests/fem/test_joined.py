@@ -345,8 +345,9 @@ def test_refusals():
 
 
 def test_a_node_on_both_sides():
-    """Four blocks about a point: one of them on side 1 of a pair and side 2 of another at the same
-    node is refused; with the sides exchanged it has both conditions."""
+    """Three blocks about a point: one of them is on side 1 of a pair and on side 2 of another at
+    the same node. The conditions are traces then, each relative to the right body, and those with
+    the sides exchanged, but for the sign of the slip."""
     parts = {
         name: BlockMesh(divisions=(2, 2), corner=corner)
         for name, corner in {"sw": (0.0, 0.0), "se": (1.0, 0.0), "ne": (1.0, 1.0)}.items()
@@ -354,12 +355,16 @@ def test_a_node_on_both_sides():
     mesh, tags = build_mesh(Blocks(parts), COMM)
     system = assemble(mesh, SOFT)
     first = contact_pair(system, tags["sw_right"], tags["se_left"])
-    sentence = (
-        r"node \(1, 1\) is on side 1 of one contact pair and on side 2 of another: where cracks "
-        r"cross, "
-        "give each arm"
-    )
     good = joined_surfaces(first, contact_pair(system, tags["ne_bottom"], tags["se_top"]))
-    assert good.total == 6
-    with pytest.raises(InputError, match=sentence):
-        joined_surfaces(first, contact_pair(system, tags["se_top"], tags["ne_bottom"]))
+    chain = joined_surfaces(first, contact_pair(system, tags["se_top"], tags["ne_bottom"]))
+    assert good.total == chain.total == 6 and good.traces is None and chain.traces is not None
+    u = per_body(system, wavy, linear, cubic)
+    values = []
+    for surface in (good, chain):
+        x = relative(ContactProblem(system, surface), u)
+        values.append((seen(surface).normal_values(x), seen(surface).tangential_values(x)))
+    assert values[1][0] == pytest.approx(values[0][0], abs=1e-12)
+    slips = values[0][1] * np.repeat([1.0, -1.0], 3)[:, None]  # tangents stay along the axes
+    assert values[1][1] == pytest.approx(slips, abs=1e-12)
+    with pytest.raises(InputError, match="faces a node of another contact pair that faces it"):
+        joined_surfaces(first, contact_pair(system, tags["se_left"], tags["sw_right"]))

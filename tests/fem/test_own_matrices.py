@@ -120,7 +120,7 @@ def test_two_bars_exchange_their_speeds():
 
 def test_corner_of_two_oblique_walls():
     """A mass on springs is pressed into a corner of 60°: it stays, and the two reactions are the
-    force's components."""
+    force's components; with friction the least forces of both walls that add up to it."""
     way = np.array([[1.0, 0.0], [0.5, np.sqrt(0.75)]])
     force = np.array([3.0, 2.0])
     system = vc.system_from_arrays(
@@ -129,8 +129,22 @@ def test_corner_of_two_oblique_walls():
     surface = vc.contact_points(system, [0, 0], way)
     state = vc.static_equilibrium(vc.ContactProblem(system, surface))
     assert state.r_n == pytest.approx(np.linalg.solve(way.T, force), rel=1e-12)
-    with pytest.raises(InputError, match="several contact directions, and friction on two faces"):
-        vc.ContactProblem(system, surface, friction=vc.Coulomb(0.3))
+    mu = 0.3
+    problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(mu))
+    state = vc.static_equilibrium(problem)
+    across = np.column_stack([-way[:, 1], way[:, 0]])
+    assert state.r_n @ way + state.r_t[:, 0] @ across == pytest.approx(force, rel=1e-12)
+    assert np.abs(state.u).max() < 1e-15
+    assert np.all(np.abs(state.r_t[:, 0]) <= mu * state.r_n * (1.0 + 1e-12))
+    # the least split, by a search over what balances: r = (n1, t1, n2, t2) with two ways free
+    B = np.stack([way, across], axis=1).reshape(4, 2)
+    found = np.column_stack([state.r_n, state.r_t]).ravel()
+    free = np.linalg.svd(B.T)[2][2:]
+    steps = np.linspace(-1.0, 1.0, 401)
+    tried = found + 1e-2 * (steps[:, None, None] * free[0] + steps[None, :, None] * free[1])
+    allowed = np.all(np.abs(tried[..., 1::2]) <= mu * tried[..., ::2], axis=-1)
+    sizes = np.linalg.norm(tried, axis=-1)
+    assert allowed.any() and sizes[allowed].min() >= np.linalg.norm(found) * (1.0 - 1e-12)
 
 
 # Rotations
@@ -490,7 +504,7 @@ def test_bad_matrices(given, said):
         ({"gap0": -1e-3}, "penetrates its obstacle by 0.001 m"),
         ({"obstacle": vc.Touching(), "gap0": 0.1}, "the obstacle gives the gaps"),
         ({"obstacle": vc.HalfSpace((0.0, -1.0), (0.0, -1.0))}, "points into the body"),
-        ({"opposite": [6]}, "side 1 of one contact pair and on side 2"),
+        ({"opposite": [6]}, "contact node .* faces itself: give each pair once"),
         ({"nodes": [0]}, "is also prescribed along its contact direction"),
         ({"nodes": [6, 6]}, "several contact surfaces with one contact direction"),
     ],

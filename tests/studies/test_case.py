@@ -513,11 +513,8 @@ steps = 1
 
 
 @pytest.mark.serial
-def test_corners_beside_friction_are_said_to_slide_freely(tmp_path: Path) -> None:
-    with pytest.raises(
-        InputError, match=r"1 contact nodes, the first at \(0, 0\), have several contact directions"
-    ):
-        read_case(write(tmp_path, CORNER)).problem(COMM)
+def test_corners_rub_on_all_faces_unless_they_are_said_to_slide(tmp_path: Path) -> None:
+    assert read_case(write(tmp_path, CORNER)).problem(COMM).surface.traces is not None
     allowed = CORNER.replace("\nfacets", "\nfrictionless_corners = true\nfacets")
     surface = read_case(write(tmp_path, allowed)).problem(COMM).surface
     assert surface.frictionless_corners and [len(corner) for corner in surface.corners] == [2]

@@ -9,7 +9,7 @@ from itertools import chain, permutations
 
 import numpy as np
 
-from .algebra import Array, Indices, from_each
+from .algebra import Array, Indices, from_each, total
 from .checks import describe_point
 from .errors import InputError
 from .surfaces import (
@@ -86,6 +86,11 @@ def make_tangent_vectors(normals: Array, nodes: Indices | None) -> Array:
     return np.take_along_axis(blocks, tangents[:, None, :], axis=2)
 
 
+def find_tangents(surface: ContactSurface) -> Array:
+    """Return the tangents along which slip and r_t of a surface are measured, (m, d, d - 1)."""
+    return make_tangent_vectors(surface.normals, surface.frame_nodes)
+
+
 def find_oblique_corners(surface: ContactSurface) -> list[Indices]:
     """Return the conditions of each node with directions that are not at right angles."""
     if surface.dual is None:
@@ -93,21 +98,30 @@ def find_oblique_corners(surface: ContactSurface) -> list[Indices]:
     return [corner for corner in surface.corners if not are_orthogonal(surface.normals[corner])]
 
 
-def refuse_rubbing(surface: ContactSurface) -> None:
-    """Raise InputError for corners beside friction, unless they are allowed to slide freely."""
-    if surface.frictionless_corners:
-        return
+def let_corners_rub(surface: ContactSurface) -> ContactSurface:
+    """Return a surface whose corners rub on all their faces, beside friction. Collective.
+
+    It is the same surface where there are none, or where they are allowed to slide freely.
+
+    Raises:
+        InputError: corners of a surface that was made by hand, without what makes traces of it.
+    """
+    if surface.frictionless_corners or not total(surface.comm, len(surface.corners)):
+        return surface
+    rubbing = surface.with_own_laws()
+    if rubbing.traces is not None:
+        return rubbing
+
     # The number and the place of the first condition of each corner, on all ranks.
     first = [(surface.slots[corner[0]], surface.points[corner[0]]) for corner in surface.corners]
     corners = list(chain.from_iterable(from_each(surface.comm, first)))
-    if corners:
-        _, point = min(corners, key=lambda corner: corner[0])
-        raise InputError(
-            f"{len(corners)} contact nodes, the first at {describe_point(point)}, have several "
-            "contact directions, and friction on two faces at once is not modelled: let them slide "
-            "freely (surface.with_frictionless_corners()), or treat the corner as smooth (a larger "
-            "feature_angle=)"
-        )
+    _, point = min(corners, key=lambda corner: corner[0])
+    raise InputError(
+        f"{len(corners)} contact nodes, the first at {describe_point(point)}, have several contact "
+        "directions, and friction on two faces at once is not modelled on a surface without finite "
+        "elements: let them slide freely (surface.with_frictionless_corners()), or treat the "
+        "corner as smooth (a larger feature_angle=)"
+    )
 
 
 def with_open_faces(surface: ContactSurface, v: Array, target: Array) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 from .algebra import Array
 from .checks import array, instance, optional, provides, quote, refuse
 from .collective import Parts, agree
-from .corners import refuse_rubbing
+from .corners import let_corners_rub
 from .errors import InputError
 from .protocols import EXCITATION, Excitation, FrictionLaw, Frictionless, ImpactLaw, MassLaw
 from .surfaces import ContactSurface
@@ -28,7 +28,8 @@ class ContactProblem:
 
     Attributes:
         system: the semi-discrete system.
-        surface: its contact conditions.
+        surface: its contact conditions; beside friction those of nodes with several conditions are
+            made anew, as traces with a law for each (``ContactSurface.with_own_laws``).
         friction: the law of friction. One that is a dataclass may hold tuples with a value for
             every contact point: of this rank, or of all ranks by their numbers.
         impact: the law that changes velocities after a step; None leaves them unchanged.
@@ -48,6 +49,8 @@ class ContactProblem:
         if isinstance(self.surface, ContactSurface):
             agree(self.surface.comm, "ContactProblem", laws | {"excitation": self.excitation})
         check_parts(self)
+        if self.frictional:
+            object.__setattr__(self, "surface", let_corners_rub(self.surface))
         object.__setattr__(self, "friction", replace_tuples(self.friction, self.surface, self._own))
 
     def _own(self, values: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -251,8 +254,6 @@ def check_parts(problem: Any) -> None:
     total = surface.total  # collective
     defects = (*_find_defects_of_system(system), *_find_defects_of_surface(surface, system, total))
     refuse(defects, surface.comm)
-    if problem.frictional:
-        refuse_rubbing(surface)
     _refuse_repeated(excitations)
 
 
@@ -340,15 +341,16 @@ def _find_defects_of_surface(
         "tangents": (m, d - 1),
     }
     shapes |= dict.fromkeys(("gap0", "weights", "bilateral", "compliance", "owned", "slots"), (m,))
+    least = 0 if surface.traces is None else -1  # conditions that are traces have no unknown
     yield from _find_other_shapes("the contact surface", surface, shapes)
 
     # Numbers of unknowns and of conditions must be there; a tangent of -1 is prescribed.
-    for name, least, end in (("owned", 0, n), ("tangents", -1, n), ("slots", 0, total)):
+    for name, lowest, end in (("owned", least, n), ("tangents", -1, n), ("slots", 0, total)):
         values = getattr(surface, name)
-        if np.size(values) and not (least <= np.min(values) and np.max(values) < end):
+        if np.size(values) and not (lowest <= np.min(values) and np.max(values) < end):
             yield (
                 f"the contact surface has {name} from {np.min(values)} to {np.max(values)}, "
-                f"outside {least} to {end - 1}: make the surface for this system, which has "
+                f"outside {lowest} to {end - 1}: make the surface for this system, which has "
                 "another size"
             )
     if np.any(np.diff(surface.slots) <= 0):

@@ -79,6 +79,8 @@ class Stage:
         k: number of the step.
         rate_factor: slip rate [m/s] over B_t x - slip0.
         carried: Bᵀr (n,) [N] of reactions of the beginning; None for none.
+        carried_reactions: these (m,) and (m, d - 1) or None [N], which traces do not tell of Bᵀr;
+            None where each unknown has one.
         weight: of this balance in the mean equation of the step.
         before: makes the balance at the beginning of the step, which has the weight 1 - ``weight``;
             None where this balance is the mean one but for its weight.
@@ -100,6 +102,7 @@ class Stage:
     k: int
     rate_factor: float
     carried: Array | None = None
+    carried_reactions: tuple[Array, Array | None] | None = None
     weight: float = 1.0
     before: Callable[[], Balance] | None = None
     old: tuple[Array, Array] | None = None
@@ -284,6 +287,8 @@ def add_increment(
     surface = step.surface
     d = result.x
     x = x + d
+    if surface.traces is not None:
+        return x  # traces have no unknown to put anywhere
     if result.active.any():
         on_bound = surface.normal_values(d) == step.bound
         surface.put_normal(x, bound, on_bound)
@@ -330,7 +335,12 @@ def average(
     system = problem.equations
     r_n = answer.r_n
     r_t = answer.r_t
-    if stage.carried is not None:
+    if stage.carried_reactions is not None:
+        carried_n, carried_t = stage.carried_reactions
+        r_n = r_n + carried_n
+        if r_t is not None and carried_t is not None:
+            r_t = r_t + carried_t
+    elif stage.carried is not None:
         r_n = r_n + surface.normal_values(stage.carried)
         if r_t is not None:
             r_t = r_t + surface.tangential_values(stage.carried)

@@ -13,9 +13,10 @@ by two so that K has the factor one in A, and dt for impulses in N s.
 
 Vectors are arrays of the unknowns that this rank owns, in the rotated basis: there B_n and B_t
 select entries, as the normal and the tangential displacements of a contact node are unknowns
-themselves. Contact arrays have shape (m,) or, tangential ones, (m, d - 1), a row for each condition
-on these unknowns; r_t is None without friction. Branch on them with ``surface.some``, which asks
-all ranks: what follows may be collective.
+themselves; where conditions share unknowns they are traces (``core.traces``). Contact arrays have
+shape (m,) or, tangential ones, (m, d - 1), a row for each condition on these unknowns; r_t is None
+without friction. Branch on them with ``surface.some``, which asks all ranks: what follows may be
+collective.
 
 The loop (``run.march``) calls, for every step, in this order:
 
@@ -35,7 +36,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from .algebra import Array, EffectiveMatrix, Mask
+from .algebra import Array, EffectiveMatrix, Mask, largest, max_abs
 from .certificate import Certificate
 from .checks import describe_point, on_all, quote
 from .errors import InputError, ViContactError
@@ -45,6 +46,9 @@ from .surfaces import ContactSurface
 
 if TYPE_CHECKING:
     from .stage import Answer, Stage
+
+
+STILL = 1e-12  # of the largest displacement: a slip of traces that is rounding
 
 
 @dataclass(frozen=True)
@@ -493,8 +497,15 @@ class Report:
 def find_slipping(report: Report) -> Mask:
     """Return which conditions (m,) moved along their support in a step with friction."""
     step = report.step
-    slip = step.surface.tangential_values(report.result.x)
-    return np.asarray(np.any(slip != step.slip0, axis=1))
+    surface = step.surface
+    assert step.slip0 is not None
+    slip = surface.tangential_values(report.result.x) - step.slip0
+    if surface.traces is None:
+        return np.asarray(np.any(slip != 0.0, axis=1))
+
+    # Where they stick traces are zero but for rounding of the unknowns that they are sums of.
+    x = report.result.x if step.origin is None else step.origin + report.result.x
+    return np.asarray(np.max(np.abs(slip), axis=1) > STILL * largest(surface.comm, max_abs(x)))
 
 
 class Recorder(Protocol):

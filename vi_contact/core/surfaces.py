@@ -2,10 +2,12 @@
 
 A contact condition bounds one unknown: after the change of basis u = T û (nodal frames turned to
 the contact direction) the normal displacement u_n of a contact point *is* an entry of û, and B_n is
-a selection of entries. Contact arrays (bounds, reactions, active sets, slips) have one row for
-every condition of this rank, and none of another's: what is asked of all of them (``some``,
-``everywhere``) is asked on all ranks. Sign: the direction n points from the body to the obstacle,
-u_n = u·n, gap = gap0 - u_n >= 0, reaction r_n >= 0.
+a selection of entries. Where conditions share unknowns, as those of a stone on two stones do, B_n
+is a matrix of any entries (``core.traces``), and the basis is that of the system. Contact arrays
+(bounds, reactions, active sets, slips) have one row for every condition of this rank, and none of
+another's: what is asked of all of them (``some``, ``everywhere``) is asked on all ranks. Sign: the
+direction n points from the body to the obstacle, u_n = u·n, gap = gap0 - u_n >= 0, reaction r_n >=
+0.
 
 ``ContactSurface`` is a value: its methods read it, or return another surface (``moving``,
 ``on_springs``, …). Below it stand the frames that T is made of: ``make_nodal_frames`` gives every
@@ -40,6 +42,7 @@ from .collective import call_user
 from .errors import InputError
 from .quantities import Positive, Unit
 from .system import Companion
+from .traces import Traces
 
 log = logging.getLogger(__name__)
 Motion = Callable[[float], float | Array]
@@ -94,6 +97,9 @@ class ContactSurface:
             depend on the number of ranks.
         tangents: (m, d-1) indices in û of the tangential unknowns of the same points; -1 where
             prescribed.
+        traces: B_n and B_t where no condition has an unknown of its own; ``owned`` and ``tangents``
+            are -1 then, and basis, dual and coupling None. None: they select ``owned`` and
+            ``tangents``.
         basis: T with u = T û, the turn into nodal frames, or None when they already point along the
             axes.
         dual: T⁻ᵀ where T is not orthogonal, because some point has contact directions at oblique
@@ -142,6 +148,7 @@ class ContactSurface:
     censuses: tuple[Census, ...] = field(default=(), repr=False)
     uncovered: Mask | None = field(default=None, repr=False)
     watched: tuple["WatchedNodes", ...] = field(default=(), repr=False)
+    traces: Traces | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         """Keep copies that nobody can write to: what is made of them once stays true."""
@@ -216,6 +223,19 @@ class ContactSurface:
         """Return the conditions of each node that has several, in the order of the nodes."""
         return () if self.nodes is None else group_same_nodes(self.nodes)
 
+    @property
+    def alone(self) -> Mask:
+        """Return which conditions (m,) have the tangents of their own direction alone: traces."""
+        return np.full(self.count, self.traces is not None)
+
+    @property
+    def frame_nodes(self) -> Indices | None:
+        """Return the nodes (m,) whose frames hold the tangents of all their conditions.
+
+        It is None where the tangents of each condition are those of its direction alone.
+        """
+        return self.nodes if self.traces is None else None
+
     def in_frames(self, u: Array) -> Array:
         """Return T⁻¹ u: displacements (n,) along the axes, turned into the nodal frames.
 
@@ -255,31 +275,43 @@ class ContactSurface:
         Args:
             x: displacement, velocity or acceleration of the owned unknowns (n,), or rows (k, n).
         """
+        if self.traces is not None:
+            return self.traces.normal_values(x)
         return np.asarray(x[self.owned] if x.ndim == 1 else x.take(self.owned, -1))
 
     def tangential_values(self, x: Array) -> Array:
         """Return B_t x (m, d - 1), zero where the tangent is prescribed."""
+        if self.traces is not None:
+            return self.traces.tangential_values(x)
         return np.where(self.tangents >= 0, x.take(self.tangents, -1), 0.0)
 
     def put_normal(self, x: Array, values: Array, chosen: Mask) -> None:
         """Write normal values into an x of the caller's own, (n,) or rows (k, n).
+
+        Traces have no unknown to write to: x stays as it is.
 
         Args:
             x: where they are written.
             values: (m,) or rows (k, m).
             chosen: of the shape of the conditions (of each row), True where they are written.
         """
+        if self.traces is not None:
+            return
         normal = x[..., self.owned]
         x[..., self.owned] = np.where(chosen, values, normal)
 
     def put_tangential(self, x: Array, values: Array, chosen: Mask) -> None:
         """Write tangential values into an x of the caller's own, (n,) or rows (k, n).
 
+        Traces have no unknown to write to: x stays as it is.
+
         Args:
             x: where they are written.
             values: (m, d - 1) or rows (k, m, d - 1).
             chosen: of the same shape, True where they are written; prescribed tangents are left.
         """
+        if self.traces is not None:
+            return
         free = self.tangents >= 0
         places = self.tangents[free]
         x[..., places] = np.where(chosen[..., free], values[..., free], x[..., places])
@@ -318,6 +350,9 @@ class ContactSurface:
             rows: number of unknowns that this rank owns.
             r_t: tangential reactions (m, d - 1) [N], or rows (k, m, d - 1), None without friction.
         """
+        if self.traces is not None:
+            return self.traces.load(r_n, rows, r_t)
+
         # Entries are set and not added, as an unknown belongs to one condition. The transposed
         # views let one statement serve a vector and rows of vectors.
         load = np.zeros((*r_n.shape[:-1], rows))
@@ -326,6 +361,24 @@ class ContactSurface:
             free = self.tangents >= 0
             load.T[self.tangents[free]] = r_t[..., free].T
         return load
+
+    def touched(self, *, frictional: bool = False) -> Indices:
+        """Return the unknowns of this rank that conditions read, ascending. Collective for traces.
+
+        Args:
+            frictional: whether those of tangents count too.
+        """
+        if self.traces is not None:
+            return self.traces.read_here(frictional=frictional)
+        tangents = self.tangents[self.tangents >= 0] if frictional else self.tangents[:0].ravel()
+        return np.unique(np.concatenate([self.owned, tangents]))
+
+    def with_own_laws(self) -> "ContactSurface":
+        """Return the surface whose nodes with several conditions rub on each of their faces.
+
+        It is the surface itself where nothing is known of what such nodes face.
+        """
+        return self
 
     def gap(self, t: float) -> Array:
         """Return the gap of the undeformed body at time t [s]: gap0 less the motion, (m,) [m]."""

@@ -10,22 +10,30 @@ backward substitution, and G comes from the corner of the factor. Where there is
 costs two whole ones, and G one for each contact unknown. Contact values here are those of all
 ranks, on every rank: the normal unknowns by the numbers of the conditions or, with friction, (r_n,
 r_t) node by node. What cannot move (a prescribed tangent) stays at zero.
+
+Where conditions are traces B of the unknowns c that they read (``core.traces``), A is condensed
+onto these all the same, and G = B (A⁻¹)_cc Bᵀ, free motion B (A⁻¹b)_c, reactions Bᵀr.
 """
 
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from ..core.algebra import Array, EffectiveMatrix, Indices, Mask
+from ..core.algebra import Array, Comm, EffectiveMatrix, Indices, Mask
 from ..core.surfaces import ContactSurface
+from ..core.traces import Traces
 from .contact_last import ContactLast
+
+ROUNDING = 2e-15  # of the largest free motion, as sums of reactions leave it
+AT_REST = 1e-12  # the same of all unknowns at once
 
 
 def condense(
     A: EffectiveMatrix, surface: ContactSurface, *, frictional: bool = False
-) -> "CondensedLast | CondensedTwice":
+) -> "Condensation":
     """Factorise A and condense it onto contact unknowns. Collective.
 
     Args:
@@ -33,6 +41,9 @@ def condense(
         surface: the contact surface.
         frictional: whether tangential unknowns count, beside the normal ones.
     """
+    if surface.traces is not None:
+        return CondensedTraces(A, surface.traces, frictional=frictional)
+
     # Contact unknowns of this rank, a row for each condition, and of all ranks by global numbers;
     # -1 stands for one that cannot move.
     first = A.algebra.first(A.matrix.rows)
@@ -53,7 +64,7 @@ def condense(
     # all.
     width = rows.shape[1]
     places = surface.slots[:, None] * width + np.arange(width)
-    return CondensedTwice(A, surface, rows[rows >= 0], places[rows >= 0], movable)
+    return CondensedTwice(A, surface.comm, rows[rows >= 0], places[rows >= 0], movable)
 
 
 class CondensedLast:
@@ -138,7 +149,7 @@ class CondensedTwice:
     def __init__(
         self,
         A: EffectiveMatrix,
-        surface: ContactSurface,
+        comm: Comm,
         owned: Indices,
         places: Indices,
         movable: Mask,
@@ -147,13 +158,13 @@ class CondensedTwice:
 
         Args:
             A: the effective matrix.
-            surface: the contact surface.
+            comm: the ranks.
             owned: the contact unknowns of this rank that can move, as rows of A.
             places: where these stand among the k contact unknowns of all ranks.
             movable: (k,) which contact unknowns can move.
         """
         self._A = A
-        self._comm = surface.comm
+        self._comm = comm
         self._owned = owned
         self._places = places
         self.movable = movable
@@ -196,4 +207,67 @@ class CondensedTwice:
         return self._A.factor.solve(load)
 
 
-Condensation = CondensedLast | CondensedTwice
+class CondensedTraces:
+    """Hold A condensed onto conditions that are traces of k unknowns.
+
+    It has the methods and attributes of ``CondensedTwice``, whose contact values are those of the
+    traces here. Of them only total forces are unique where traces depend on one another.
+    """
+
+    def __init__(self, A: EffectiveMatrix, traces: Traces, *, frictional: bool) -> None:
+        """Condense A onto the unknowns that the traces read. Collective.
+
+        Args:
+            A: the effective matrix.
+            traces: the conditions.
+            frictional: whether tangential traces count, beside the normal ones.
+        """
+        B = traces.every
+        if not frictional:
+            B = B[:: 1 + traces.moves.shape[1]]
+        self._B = B
+        self._Bt = sp.csr_matrix(B.T)
+        everything = np.ones(len(traces.unknowns), dtype=bool)
+        factor = A.contact_last(traces.unknowns)
+        if factor is None:
+            twice = CondensedTwice(A, traces.comm, traces.own, traces.places, everything)
+            self._unknowns: CondensedLast | CondensedTwice = twice
+        else:
+            self._unknowns = CondensedLast(factor, everything)
+        self.movable: Mask = np.diff(B.indptr) > 0
+
+        # G = B C Bᵀ, as symmetric as C.
+        C = self._unknowns.flexibility
+        G = np.asarray(B @ (B @ C.T).T)
+        self.flexibility: Array = 0.5 * (G + G.T) if A.algebra.symmetric else G
+
+    def find_free_motion(self, b: Array) -> Array:
+        """Return B A⁻¹b, and keep b for ``answer``. Collective."""
+        self._free = self._unknowns.find_free_motion(b)
+        return np.asarray(self._B @ self._free)
+
+    def answer(self, r: Array, held: Mask, values: Array) -> Array:
+        """Return x = A⁻¹(b - Bᵀr), owned rows. Collective.
+
+        A trace is no unknown that could be put on a value: rounding stays. Unknowns that reactions
+        bring to rest but for rounding are zero.
+
+        Args:
+            r: reactions of the conditions, in the unit of b.
+            held: is not read.
+            values: is not read.
+        """
+        force = self._Bt @ r
+        x = self._free - self._unknowns.flexibility @ force
+        # Where all are at rest what is left of them is rounding of the method too.
+        size = np.abs(self._free).max(initial=0.0)
+        is_at_rest = np.abs(x).max(initial=0.0) <= AT_REST * size
+        still = np.abs(x) <= (AT_REST if is_at_rest else ROUNDING) * size
+        return self._unknowns.answer(force, still, np.zeros(len(still)))
+
+    def respond(self, r: Array) -> Array:
+        """Return A⁻¹ Bᵀ r, owned rows, of reactions r. Collective."""
+        return self._unknowns.respond(self._Bt @ r)
+
+
+Condensation = CondensedLast | CondensedTwice | CondensedTraces

@@ -34,6 +34,7 @@ from ..core.quantities import RATIO, Between
 from ..core.sizes import is_small_problem
 from ..core.surfaces import ContactSurface
 from ..core.system import SemiDiscreteSystem
+from ..core.traces import Traces
 from ..kernels.condensation import condense
 
 NEGLIGIBLE = 1e-17  # of the largest entry of a column of M⁻¹Bᵀ: what is left out
@@ -41,6 +42,7 @@ STORED = 20  # entries a row of M⁻¹Bᵀ: half a substitution reads more in tw
 # Problems in the plane are small up to so many times the unknowns of ``core.sizes``: their factors
 # are sparse, and impacts come in every step.
 IN_PLANE = 6
+DEPENDENT = 1e-12  # of the largest singular value: impulses that have no effect
 UPDATE_REMEDY = "give ComponentReset() or ImpulseUpdate()"
 
 
@@ -66,7 +68,9 @@ class ComponentReset:
 
     At a corner with oblique faces of which some only are closed the velocity of the node changes
     along the normals of these, and with it the normal components on its other faces, as at any
-    other node.
+    other node. Where conditions share unknowns (``core.traces``) the unknowns that they read change
+    as little as they can, each by the inverse of its diagonal entry of M, which keeps the sum of
+    momenta of lumped masses.
     """
 
     by_rows: ClassVar[bool] = True
@@ -75,11 +79,43 @@ class ComponentReset:
         self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
     ) -> Array:
         """Return the velocity with its normal components set; arguments of ``VelocityUpdate``."""
+        if surface.traces is not None:
+            return _reset_traces(system, surface, surface.traces, v, target)
         target = with_open_faces(surface, v, target)
         v_n = np.where(np.isnan(target), surface.normal_values(v), target)
         after = v.copy()
         after.T[surface.owned] = v_n.T
         return after
+
+
+def _reset_traces(
+    system: SemiDiscreteSystem, surface: ContactSurface, traces: Traces, v: Array, target: Array
+) -> Array:
+    """Return v + m⁻¹Bᵀ(B m⁻¹Bᵀ)⁻¹(target - B v) with m = diag M. Collective.
+
+    Args:
+        system: the equations that are marched.
+        surface: the contact conditions.
+        traces: their B.
+        v: velocity (n,) [m/s] before, or rows (k, n).
+        target: wanted normal velocities (m,) [m/s], NaN where they stay; or rows (k, m).
+    """
+    if v.ndim == 2:
+        rows = zip(v, target, strict=True)
+        return np.stack([_reset_traces(system, surface, traces, *row) for row in rows])
+    jump = surface.everywhere(target - surface.normal_values(v))
+    chosen = np.flatnonzero(~np.isnan(jump))
+    light = np.zeros(len(traces.unknowns))
+    light[traces.places] = 1.0 / system.M.diagonal()[traces.own]
+    light = surface.comm.sum(light)
+
+    # Normal traces that depend on one another share the impulse equally: least squares.
+    B = traces.every[:: surface.points.shape[1]][chosen]
+    flexibility = (B.multiply(light) @ B.T).toarray()
+    impulse = np.linalg.lstsq(flexibility, jump[chosen], rcond=DEPENDENT)[0]
+    after = v.copy()
+    after[traces.own] += (light * (B.T @ impulse))[traces.places]
+    return after
 
 
 @dataclass(frozen=True)
@@ -103,6 +139,7 @@ class ImpulseUpdate:
             lambda: is_small_problem(surface.comm, system.rows, surface.count, worth=worth),
             surface,
         )
+        is_small = is_small or surface.traces is not None
         update = _update_condensed if is_small else _update_by_iterations
         return update(system, surface, v, target)
 
@@ -146,7 +183,11 @@ def _update_condensed(
         "impulse update", lambda: _condense_mass(system, surface), surface
     )
     impulse = np.zeros(surface.total)
-    impulse[chosen] = np.linalg.solve(flexibility[np.ix_(chosen, chosen)], jump[chosen])
+    part = flexibility[np.ix_(chosen, chosen)]
+    if surface.traces is None:
+        impulse[chosen] = np.linalg.solve(part, jump[chosen])
+    else:  # traces may depend on one another
+        impulse[chosen] = np.linalg.lstsq(part, jump[chosen], rcond=DEPENDENT)[0]
     return np.asarray(v + respond(impulse))
 
 

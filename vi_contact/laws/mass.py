@@ -160,6 +160,10 @@ def _mark_contact_unknowns(
         tangential: whether tangential unknowns lose their mass too.
     """
     contact = np.zeros(system.rows, dtype=bool)
+    if surface.traces is not None:
+        # Where conditions share unknowns the nodes of all sides lose their inertia as a whole.
+        contact[select_named(system, surface.traces.unknowns)] = True
+        return contact.copy(), contact
     contact[surface.owned] = True
     normal = contact.copy()
     contact[surface.tangents[surface.tangents >= 0]] = True

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.algebra import Array, Mask
-from ..core.corners import make_tangent_vectors
+from ..core.corners import find_tangents
 from ..core.problem import ContactProblem
 from ..core.state_checks import check_problem_given, check_sizes
 from ..core.step import State
@@ -82,7 +82,7 @@ def contact_values(
 
     # Tangents of a node with several directions follow from all of these, so from all conditions.
     whole = surface.whole()
-    tangents = make_tangent_vectors(whole.normals, whole.nodes)
+    tangents = find_tangents(whole)
     traction = np.einsum("kdc,kc->kd", tangents, surface.everywhere(r_t / weights))
     slip = np.einsum("kdc,kc->kd", tangents, surface.everywhere(slip))
     return ContactValues(

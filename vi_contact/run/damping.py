@@ -11,18 +11,21 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
-from ..core.algebra import Array, Mask, Matrix, total
+from ..core.algebra import Array, Mask, Matrix, largest, max_abs, total
 from ..core.checks import quote
 from ..core.problem import ContactProblem
 from ..core.state_checks import check_problem_given
 from ..core.surfaces import ContactSurface
 from ..core.system import SemiDiscreteSystem
+from ..core.traces import Traces
 from ..laws.free_motions import free_motions
 from ..laws.materials import DampingRatio, NoDamping
 from .modal import natural_modes
 
 TOUCHING = 1e-9  # of the size of the bodies: a gap that is none
+STIFF = 1e6  # of the largest K_ii: springs that hold traces, to six digits of a frequency
 ALIKE = 1e-6  # of a frequency: modes that are closer are one motion in several directions
 CACHE = "modes at the start"  # the name of what ``_list_modes`` returns, in a system's cache
 NOT_COMPUTED = "not computed at its periods"
@@ -138,7 +141,8 @@ def _assemble_closed(problem: ContactProblem, closed: Mask) -> tuple[Matrix, Mat
 
     The system is that of the nodal frames, without excitation. A closed condition on a rigid
     support takes its unknown out, and with friction the tangential ones too (sticking); one on a
-    spring adds 1 / compliance to K_ii.
+    spring adds 1 / compliance to K_ii. Traces have no unknowns to take out: stiff springs hold
+    them.
 
     Args:
         problem: whose matrices they are.
@@ -151,6 +155,13 @@ def _assemble_closed(problem: ContactProblem, closed: Mask) -> tuple[Matrix, Mat
     soft = closed & ~surface.rigid
 
     free = np.ones(system.rows, dtype=bool)
+    if surface.traces is not None:
+        stiff = STIFF * largest(surface.comm, max_abs(system.K.diagonal()))
+        normal = np.where(rigid, stiff, 0.0)
+        normal[soft] = 1.0 / surface.compliance[soft]
+        along = np.where(closed, stiff, 0.0)
+        springs_of_traces = _make_trace_springs(problem, surface.traces, normal, along)
+        return algebra.combine([(1.0, system.K), *springs_of_traces]), system.M, free
     free[surface.owned[rigid]] = False
     if problem.frictional:
         has_unknown = surface.tangents >= 0  # else the component is prescribed
@@ -163,6 +174,39 @@ def _assemble_closed(problem: ContactProblem, closed: Mask) -> tuple[Matrix, Mat
     K = algebra.block(algebra.combine([(1.0, system.K), (1.0, on_springs)]), free)
     M = algebra.block(system.M, free)
     return K, M, free
+
+
+def _make_trace_springs(
+    problem: ContactProblem, traces: Traces, normal: Array, tangential: Array
+) -> list[tuple[float, Matrix]]:
+    """Return terms (factor, matrix) whose sum is Bᵀ k B, springs k along traces. Collective.
+
+    Args:
+        problem: whose unknowns they are.
+        traces: the conditions.
+        normal: (m,) stiffness [N/m] along the normals.
+        tangential: (m,) along the tangents, which is used with friction only.
+    """
+    surface = problem.surface
+    algebra = problem.static_load.algebra
+    n = problem.static_load.rows
+    width = surface.tangents.shape[1]
+    along = np.repeat(tangential[:, None], width, axis=1)
+    k = np.column_stack([normal, along if problem.frictional else np.zeros_like(along)])
+    B = traces.every
+    whole = sp.csr_matrix(B.T.multiply(surface.everywhere(k).ravel()) @ B)
+
+    # An algebra replaces rows of the identity: those of springs are added to it, and it is taken
+    # away again.
+    own = sp.csr_matrix(whole[traces.places])
+    shape = (len(traces.own), problem.system.space.unknowns)
+    rows = sp.csr_matrix((own.data, traces.unknowns[own.indices], own.indptr), shape=shape)
+    places = (np.arange(shape[0]), traces.own + algebra.first(n))
+    rows = rows + sp.csr_matrix((np.ones(shape[0]), places), shape=shape)
+    every = np.arange(n)
+    identity = algebra.local(every, every, np.ones(n), n)
+    replaced = algebra.replace_identity_rows(n, traces.own, sp.csr_matrix(rows))
+    return [(1.0, replaced), (-1.0, identity)]
 
 
 def _count_rigid_motions(problem: ContactProblem) -> int:

@@ -15,6 +15,7 @@ those of ``core.step.Scheme``, which explains them.
 
 import logging
 from collections.abc import Callable, Mapping
+from typing import ClassVar
 
 from ..core.algebra import Array, Mask
 from ..core.errors import InputError
@@ -74,7 +75,13 @@ class BalanceStep:
     """Share what schemes with contact in the balance of forces have in common.
 
     They are safe only where contact nodes have no mass.
+
+    Attributes:
+        reads_reactions: whether the scheme reads reactions out of forces on the unknowns that it
+            remembers, which traces do not tell.
     """
+
+    reads_reactions: ClassVar[bool] = False
 
     @property
     def mass(self) -> MassLaw:
@@ -82,7 +89,16 @@ class BalanceStep:
         return Redistributed()
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for an impact law on massless nodes; warn of mass at contact nodes."""
+        """Raise InputError for an impact law on massless nodes; warn of mass at contact nodes.
+
+        Conditions that share unknowns are refused where the scheme ``reads_reactions``.
+        """
+        if self.reads_reactions and problem.surface.traces is not None:
+            raise InputError(
+                f"{self} remembers reactions as forces on the unknowns, of which contact "
+                "conditions that share unknowns cannot be told apart: take Midpoint(), "
+                "Trapezoidal(), SS22() or MoreauJean()"
+            )
         check_balance(repr(self), problem)
 
 
@@ -99,6 +115,7 @@ def position_stage(
     scale: float = 1.0,
     active: Mask | None = None,
     carried: Array | None = None,
+    carried_reactions: tuple[Array, Array | None] | None = None,
     weight: float = 1.0,
     before: Callable[[], Balance] | None = None,
     old: tuple[float, Array] | None = None,
@@ -118,6 +135,7 @@ def position_stage(
         scale: what the balance is multiplied by, a pure number.
         active: predicted contact set (m,); None for that of the state.
         carried: Bᵀr (n,) [N] of reactions of the beginning; None for none.
+        carried_reactions: these reactions [N]; None: they are read out of Bᵀr.
         weight: of this balance in the mean equation of the step.
         before: makes the balance at the beginning, with the weight 1 - ``weight``; None for none.
         old: (share, u0) where u is a sum share u0 + u1 over both ends; None where it is no such
@@ -147,6 +165,7 @@ def position_stage(
         k=state.k + 1,
         rate_factor=1.0 / dt,
         carried=carried,
+        carried_reactions=carried_reactions,
         weight=weight,
         before=before,
         old=of_start,
@@ -209,7 +228,7 @@ def _refuse_massless_elsewhere(problem: ContactProblem) -> None:
     """Raise InputError for unknowns without mass beside contact nodes with mass."""
     layer = problem.equations.massless
     surface = problem.surface
-    if layer is not None and surface.some(~layer[surface.owned]):
+    if layer is not None and surface.some(~layer[surface.touched()]):
         raise InputError(
             "rows of M are zero while contact nodes have mass: condense these unknowns out of K "
             "(it is exact, as for rotations of a lumped beam), give them mass, or use "

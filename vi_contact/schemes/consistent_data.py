@@ -25,7 +25,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.algebra import Array, EffectiveMatrix, max_abs
+from ..core.algebra import Array, EffectiveMatrix, Mask, max_abs
 from ..core.free_unknowns import solve_free
 from ..core.problem import ContactProblem
 from ..core.sizes import is_small_problem
@@ -167,13 +167,7 @@ def equilibrate(problem: ContactProblem, state: State) -> State:
         lambda: EffectiveMatrix(system.algebra.block(system.K, layer), system.algebra),
     )
 
-    # Contact conditions bound massless unknowns alone: here they are numbered among these.
-    place = np.where(layer, np.cumsum(layer) - 1, -1)
-    surface = problem.surface
-    tangents = np.where(surface.tangents >= 0, place[surface.tangents], -1)
-    surface = replace(
-        surface, owned=place[surface.owned], tangents=tangents, basis=None, coupling=None, dual=None
-    )
+    surface = _number_among(problem.surface, layer, A)
     step = StepProblem(
         A=A,
         b=load[layer],
@@ -195,6 +189,24 @@ def equilibrate(problem: ContactProblem, state: State) -> State:
     u = state.u.copy()
     u[layer] = result.x
     return replace(state, u=u, r_n=result.r_n, r_t=result.r_t, active=result.active)
+
+
+def _number_among(surface: ContactSurface, layer: Mask, A: EffectiveMatrix) -> ContactSurface:
+    """Return a surface whose conditions bound massless unknowns, numbered among these. Collective.
+
+    Args:
+        surface: the contact conditions.
+        layer: (n,) the massless unknowns.
+        A: the block of K of these.
+    """
+    if surface.traces is not None:
+        first = A.algebra.first(A.matrix.rows)
+        return replace(surface, traces=surface.traces.among(layer, first))
+    place = np.where(layer, np.cumsum(layer) - 1, -1)
+    tangents = np.where(surface.tangents >= 0, place[surface.tangents], -1)
+    return replace(
+        surface, owned=place[surface.owned], tangents=tangents, basis=None, coupling=None, dual=None
+    )
 
 
 def replace_massless(problem: ContactProblem, x: Array, values: Array | float) -> Array:

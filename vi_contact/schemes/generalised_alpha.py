@@ -57,6 +57,7 @@ class AlphaStep(BalanceStep, ABC):
     """
 
     by_rows: ClassVar[bool] = True
+    reads_reactions: ClassVar[bool] = True
 
     @property
     @abstractmethod

@@ -60,6 +60,7 @@ class LinearMultistep(BalanceStep):
     """
 
     by_rows: ClassVar[bool] = True
+    reads_reactions: ClassVar[bool] = True
 
     a: tuple[float, ...]
     b: tuple[float, ...]

@@ -114,6 +114,7 @@ class Trapezoidal:
             a=Affine(None, 4.0 / dt**2),
             load=system.load_at(state.t) + system.load_at(state.t + dt),
             carried=problem.surface.reaction_load(state.r_n, state.u.shape[-1], state.r_t),
+            carried_reactions=(state.r_n, state.r_t),
             weight=0.5,
             old=(1.0, state.u),
         )

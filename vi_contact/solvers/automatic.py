@@ -38,7 +38,7 @@ class Automatic:
     ``iterative`` solves problems in space from 50 000 unknowns on (20 000 on several ranks, or
     without CHOLMOD), and problems with more contact points (with friction: contact unknowns) than
     4000 in space or 5000 in the plane. ``condensed`` solves all others, and all problems without
-    finite elements. The log says which one is used.
+    finite elements, or whose conditions share unknowns. The log says which one is used.
 
     Attributes:
         condensed: the solver of smaller problems.
@@ -77,7 +77,7 @@ class Automatic:
             surface: the contact surface.
             frictional: whether tangential unknowns count too.
         """
-        if isinstance(matrix, SerialMatrix):
+        if isinstance(matrix, SerialMatrix) or surface.traces is not None:
             return self.condensed
         dimension = surface.points.shape[1]
         comm = surface.comm
@@ -149,7 +149,7 @@ def solver_beside_steps(A: EffectiveMatrix, surface: ContactSurface) -> Solver:
 
         return Volume()
     is_small = is_small_problem(surface.comm, A.matrix.rows, surface.count)
-    if is_small or find_spec("petsc4py") is None:
+    if is_small or surface.traces is not None or find_spec("petsc4py") is None:
         return Condensed()
     from .iterative import Iterative
 

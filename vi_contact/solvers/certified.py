@@ -121,6 +121,21 @@ class CertifiedSolver:
         )
 
 
+def refuse_traces(owner: str, surface: ContactSurface) -> None:
+    """Raise InputError for conditions that share unknowns, where a solver needs one for each.
+
+    Args:
+        owner: the solver, as messages name it.
+        surface: the contact conditions.
+    """
+    if surface.traces is not None:
+        raise InputError(
+            f"{owner} needs an unknown for each contact condition, and conditions of this surface "
+            "share some, as those of a node in several pairs do, or of a corner that rubs on all "
+            "its faces: use Condensed()"
+        )
+
+
 def check_laws(owner: str, problem: ContactProblem, *, unsymmetric: bool = False) -> None:
     """Raise InputError for laws and matrices that do not suit a solver. Collective.
 

@@ -275,7 +275,10 @@ class NonlinearSolver:
             share: of K, in the place of as much of the tangent.
         """
         system = walk.forces.system
-        rows = walk.whole.surface.owned[walk.here.active]
+        surface = walk.whole.surface
+        # Traces have no unknown to brace: their closed points may move together.
+        braced = walk.here.active if surface.traces is None else np.zeros(surface.count, dtype=bool)
+        rows = surface.owned[braced]
         springs = BRACE * np.abs(system.K.diagonal()[rows])
         brace = system.algebra.local(rows, rows, springs, system.rows)
         return system.algebra.combine([(1.0 - share, tangent), (share, system.K), (1.0, brace)])

@@ -28,8 +28,8 @@ from ..body.hierarchical import Hierarchy
 from ..body.space import FemSpace
 from ..mesh.numbering import facet_rows
 from ..mesh.tagged_mesh import Facets
+from .conditions import Facing
 from .faces import outward_normals
-from .frames import Facing
 from .nodes import Nodes, Rows
 
 POINTS = 5  # of a rule in every direction: exact for degree 8 on flat facets

@@ -7,64 +7,33 @@ directions of the node are oblique. In space a node with two directions has the 
 its edge as the third. A rank holds the conditions of its own nodes.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from ...core.algebra import Array, Indices, Mask, Matrix, largest
+from ...core.algebra import Array, Indices, Mask, Matrix, largest, total
 from ...core.checks import describe_point
 from ...core.corners import PARALLEL, are_orthogonal, make_corner_frame
 from ...core.errors import InputError
 from ...core.surfaces import (
     ContactSurface,
+    Motion,
     arrange_frames,
     group_same_nodes,
     list_tangential_columns,
     make_nodal_frames,
 )
 from ..mesh.nodal_space import NodalSpace
-from .borrowing import Borrowed
-from .nodes import Nodes, ask_alike, join_nodes
+from .conditions import Facing, NodalConditions
+from .nodes import ask_alike, join_nodes
+from .traced import need_traces, trace_conditions
 
 # least singular value of a node's directions: two that turn by 0.8° (CHOSEN; T has 1 over it)
 INDEPENDENT = 0.01
-
-
-@dataclass(frozen=True, eq=False)
-class Facing:
-    """Hold what m contact nodes face: opposite node s the other body moves by sum_j P_sj u_j.
-
-    Attributes:
-        nodes: the n nodes j, of all ranks.
-        P: (m, n).
-    """
-
-    nodes: Nodes
-    P: sp.csr_matrix
-
-
-@dataclass(frozen=True, eq=False)
-class NodalConditions:
-    """Hold this rank's m conditions u·direction <= gap at nodes.
-
-    Attributes:
-        nodes: their nodes.
-        directions: (m, d) unit vectors.
-        slots: (m,) their numbers among those of all ranks, ascending.
-        facing: what they face if that deforms too: u is relative to it.
-        bubbles: what the bubbles of edges add to u, where displacements have them (``.bubbles``).
-        borrowed: pressures of nodes without a condition.
-    """
-
-    nodes: Nodes
-    directions: Array
-    slots: Indices
-    facing: Facing | None = None
-    bubbles: tuple[Facing, ...] = ()
-    borrowed: Borrowed | None = None
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -74,10 +43,60 @@ class FemSurface(ContactSurface):
     Attributes:
         space: what the unknowns mean.
         parts: the conditions, one part after the other.
+        own_slide: ``slide`` along the tangents that conditions have as traces; None where ``slide``
+            is None or not known of corners.
     """
 
     space: NodalSpace = field(repr=False)
     parts: tuple[NodalConditions, ...] = field(repr=False)
+    own_slide: Callable[[float], Array] | None = field(default=None, repr=False)
+
+    def moving(self, towards: Motion | None = None, along: Motion | None = None) -> "FemSurface":
+        """Return the surface on an obstacle that moves; see ``ContactSurface.moving``.
+
+        Args:
+            towards: function of the time t [s] -> how far towards the body [m].
+            along: function of the time t [s] -> how far along the tangents [m].
+        """
+        moved: Any = super().moving(towards, along)
+        surface: FemSurface = replace(moved, own_slide=None)
+        return surface
+
+    @property
+    def has_corners(self) -> bool:
+        """Say whether some node of any rank has several conditions. Collective."""
+        return total(self.comm, len(self.corners)) > 0.0
+
+    def find_own_slide(self) -> Callable[[float], Array] | None:
+        """Return ``slide`` along the tangents of conditions as traces. Collective.
+
+        It is None for an obstacle that does not slide, and where that is not known of corners.
+        """
+        if self.slide is None or self.traces is not None or not self.has_corners:
+            return self.slide
+        return self.own_slide
+
+    def with_own_laws(self) -> "FemSurface":
+        """Return the same conditions as traces, so that corners rub on each of their faces.
+
+        Tangents of a condition are those of its own direction then. Collective when first asked.
+        """
+        return self if self.traces is not None else self._traced
+
+    @cached_property
+    def _traced(self) -> "FemSurface":
+        """Return the same conditions as traces, made once."""
+        slide = self.find_own_slide()
+        if self.slide is not None and slide is None:
+            raise InputError(
+                "the obstacle slides along tangents of corners that rub on all their faces: take "
+                "surface = surface.with_own_laws() before surface.moving(along=…), whose tangents "
+                "are those of each face alone"
+            )
+        conditions = ("gap0", "weights", "bilateral", "compliance", "motion", "uncovered")
+        others = ("companions", "censuses", "watched")
+        data = {name: getattr(self, name) for name in (*conditions, *others)}
+        return surface_of(self.space, self.parts, traced=True, slide=slide, **data)
 
 
 class NodalFrames:
@@ -112,7 +131,7 @@ class NodalFrames:
         """
         self.points = points
         self.directions = directions
-        self._refuse_prescribed(held)
+        refuse_prescribed(points, directions, held)
         # one frame for each node, from the direction of its first condition
         self.numbers, first, place = np.unique(numbers, return_index=True, return_inverse=True)
         self.place: Indices = place.ravel()
@@ -151,15 +170,6 @@ class NodalFrames:
         own[np.arange(m), self.column] = True
         return own
 
-    def _refuse_prescribed(self, held: Mask) -> None:
-        """Raise InputError for a contact direction with a component that is prescribed."""
-        for slot in np.flatnonzero(np.any(held & (self.directions != 0.0), axis=1)):
-            raise InputError(
-                f"contact node {describe_point(self.points[slot])} is also prescribed along its "
-                "contact direction: free that component or leave the node out of the contact "
-                "surface"
-            )
-
     def _refuse_dependent(self, slots: Indices) -> None:
         """Raise InputError for directions of a node that are parallel, too many or dependent."""
         directions = self.directions[slots]
@@ -179,6 +189,21 @@ class NodalFrames:
                 "corner as smooth (a larger feature_angle=), or leave the node out of some of its "
                 "surfaces (points=)"
             )
+
+
+def refuse_prescribed(points: Array, directions: Array, held: Mask) -> None:
+    """Raise InputError for a contact direction with a component that is prescribed.
+
+    Args:
+        points: (m, d) nodes [m].
+        directions: (m, d) unit vectors.
+        held: (m, d) which components of the nodes are prescribed.
+    """
+    for slot in np.flatnonzero(np.any(held & (directions != 0.0), axis=1)):
+        raise InputError(
+            f"contact node {describe_point(points[slot])} is also prescribed along its contact "
+            "direction: free that component or leave the node out of the contact surface"
+        )
 
 
 def snap_to_axes(directions: Array) -> Array:
@@ -201,12 +226,15 @@ def gather_frame_data(parts: Sequence[NodalConditions]) -> tuple[Indices, Array,
     )
 
 
-def surface_of(space: NodalSpace, parts: Sequence[NodalConditions], **data: Any) -> FemSurface:
+def surface_of(
+    space: NodalSpace, parts: Sequence[NodalConditions], *, traced: bool = False, **data: Any
+) -> FemSurface:
     """Make the surface of conditions, one part after the other. Collective.
 
     Args:
         space: what the unknowns mean.
         parts: this rank's m conditions.
+        traced: whether they are traces also where each could have an unknown of its own.
         **data: gap0 (m,), weights (m,) and whatever else a ``ContactSurface`` holds of them.
 
     Raises:
@@ -221,6 +249,9 @@ def surface_of(space: NodalSpace, parts: Sequence[NodalConditions], **data: Any)
     slots = np.concatenate(
         [start + part.slots for start, part in zip(starts[:-1], parts, strict=True)]
     )
+    if traced or need_traces(space, parts):
+        _refuse_traced_bubbles(space)
+        return _traced_surface_of(space, parts, slots, data)
     # frames are made on each rank of its own nodes, and what one refuses all ranks refuse
     answer = ask_alike(
         comm, slots, lambda *arrays: (NodalFrames(*arrays),), *gather_frame_data(parts)
@@ -249,6 +280,37 @@ def surface_of(space: NodalSpace, parts: Sequence[NodalConditions], **data: Any)
         dual=dual,
         nodes=frames.numbers[place],
         coupling=_make_coupling(space, parts, frames, index),
+        space=space,
+        parts=tuple(parts),
+        **{"bilateral": np.zeros(count, dtype=bool), "compliance": np.zeros(count)} | data,
+    )
+
+
+def _traced_surface_of(
+    space: NodalSpace, parts: Sequence[NodalConditions], slots: Indices, data: dict[str, Any]
+) -> FemSurface:
+    """Make the surface of conditions that are traces. Collective.
+
+    Args:
+        space: what the unknowns mean.
+        parts: this rank's m conditions.
+        slots: (m,) their numbers among those of all ranks.
+        data: what else the surface holds of them.
+    """
+    nodes = join_nodes([part.nodes for part in parts])
+    directions = np.concatenate([part.directions for part in parts])
+    refuse_prescribed(nodes.points, directions, nodes.held)
+    count = len(slots)
+    nothing = np.full((count, space.dimension), -1)
+    return FemSurface(
+        comm=space.comm,
+        points=nodes.points,
+        normals=directions,
+        owned=nothing[:, 0],
+        slots=slots,
+        tangents=nothing[:, 1:],
+        nodes=nodes.numbers,
+        traces=trace_conditions(space, parts, slots),
         space=space,
         parts=tuple(parts),
         **{"bilateral": np.zeros(count, dtype=bool), "compliance": np.zeros(count)} | data,
@@ -299,7 +361,6 @@ def _make_coupling(
     """
     if all(part.facing is None and not part.bubbles for part in parts):
         return None
-    _refuse_chains(space, parts)
     algebra = space.algebra
     n = len(space.ids)
     first = algebra.first(n)
@@ -379,34 +440,12 @@ def _express_faced(
     return sp.csr_matrix((values[used], places), shape=(len(rows), total))
 
 
-def _refuse_chains(space: NodalSpace, parts: Sequence[NodalConditions]) -> None:
-    """Raise InputError for a node on side 1 of a pair, or with bubbles, and on side 2 of another.
-
-    R = 1 + N has the inverse 2 - R where N N = 0: what is faced must not face others. Collective.
-
-    Args:
-        space: what the unknowns mean.
-        parts: this rank's conditions.
-    """
-    coupled = [part.nodes.numbers for part in parts if part.facing is not None or part.bubbles]
-    first = np.zeros((len(space.nodes), 1))
-    first[space.blocks_of(np.concatenate(coupled))] = 1.0
-    for facing in (part.facing for part in parts if part.facing is not None):
-        used = np.zeros(len(facing.nodes.numbers))
-        used[facing.P.indices] = 1.0
-        both = np.flatnonzero(
-            space.at_nodes(space.leaders(facing.nodes.numbers), first)[:, 0] * space.comm.max(used)
+def _refuse_traced_bubbles(space: NodalSpace) -> None:
+    """Raise InputError for P2 tetrahedra, whose unknowns are no displacements of nodes."""
+    if space.hierarchy is not None:
+        raise InputError(
+            "nodes of P2 tetrahedra have one contact condition for each unknown: leave those that "
+            "are on side 1 of one pair and on side 2 of another, or on two faces that rub, out of "
+            "one of them (points=), exchange the sides, let corners slide "
+            "(surface.with_frictionless_corners()), or use degree=1"
         )
-        if len(both):
-            where = f"node {describe_point(facing.nodes.points[both[0]])}"
-            if space.hierarchy is not None:
-                raise InputError(
-                    f"{where} of P2 tetrahedra is on side 2 of a contact pair and of another "
-                    "surface: leave it out of that surface (points=), or exchange the sides"
-                )
-            raise InputError(
-                f"{where} is on side 1 of one contact pair and on side 2 of another: where cracks "
-                "cross, give each arm a group and a cut of its own, with matching=NodeToNode() and "
-                "sides that take turns round the crossing; else exchange the sides of one pair, or "
-                "give it once if both are the same"
-            )

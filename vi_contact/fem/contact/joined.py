@@ -64,7 +64,9 @@ def joined_surfaces(*surfaces: ContactSurface) -> ContactSurface:
         censuses=tuple(chain(*(surface.censuses for surface in ours))),
         **data,
     )
-    joined = replace(joined, slide=_join_slides(ours))
+    alone = _join_own_slides(ours)
+    slide = alone if joined.traces is not None else _join_slides(ours)
+    joined = replace(joined, slide=slide, own_slide=alone)
     if all(surface.frictionless_corners for surface in ours):
         return joined.with_frictionless_corners()
     return joined
@@ -85,6 +87,19 @@ def _join_motions(motions: Sequence[tuple[Motion | None, tuple[int, ...]]]) -> M
     return lambda t: np.concatenate(
         [np.zeros(shape) if motion is None else motion(t) for motion, shape in motions]
     )
+
+
+def _join_own_slides(surfaces: Sequence[FemSurface]) -> Motion | None:
+    """Return how far obstacles slide along the tangents of conditions as traces. Collective.
+
+    It is None where no obstacle slides, and where that is not known of the corners of some surface.
+    """
+    slides = [surface.find_own_slide() for surface in surfaces]
+    for surface, slide in zip(surfaces, slides, strict=True):
+        if surface.slide is not None and slide is None:
+            return None
+    shapes = [(surface.count, surface.tangents.shape[1]) for surface in surfaces]
+    return _join_motions(list(zip(slides, shapes, strict=True)))
 
 
 def _join_slides(surfaces: Sequence[FemSurface]) -> Motion | None:

@@ -18,7 +18,7 @@ from ...core.checks import describe_point
 from ...core.errors import InputError
 from ...core.quantities import Positive
 from .nodes import Nodes
-from .partners import Surface, choose_partner
+from .partners import Surface, choose_partners
 
 NEARBY = 8  # nodes of side 2 that are looked at first
 # cosine of the angle between a normal and what it is seen from: under less no side faces another
@@ -116,16 +116,17 @@ class NodeToNode:
     """Match conforming sides: each node of side 1 has one of side 2 opposite, along its normal.
 
     Of several nodes at one place, of bodies that meet there, the partner is the one whose facets
-    lie in front of all facets of the node.
+    lie in front of all facets of the node. Where each has a part of them, as two stones under a
+    third one have, the node has a condition for each, with the weight of these facets.
 
     Args:
         tolerance: how far beside the normal the partner may lie, as a share of the distance to the
             next node of side 1.
 
     Raises:
-        InputError: from ``match``, nodes without a partner, several nodes that are none by
-            themselves, as two stones under a third one, two nodes with the same partner, and sides
-            that do not face each other.
+        InputError: from ``match``, nodes without a partner, several nodes at one place that share
+            facets in front of the node, two nodes elsewhere with the same partner, and sides that
+            do not face each other.
     """
 
     tolerance: Annotated[float, Positive] = BESIDE
@@ -141,7 +142,7 @@ class NodeToNode:
             side2: side 2.
             size: that of the mesh [m].
         """
-        partner = self._find_partners(side1, side2, size)
+        partner, several = self._find_partners(side1, side2, size)
         missing = np.flatnonzero(partner < 0)
         if len(missing):
             raise InputError(
@@ -151,20 +152,30 @@ class NodeToNode:
                 "mesh both sides alike, make the smaller side the first, or use "
                 "matching=DualMortar()"
             )
-        partners, counts = np.unique(partner, return_counts=True)
-        if counts.max() > 1:
-            raise InputError(
-                f"several nodes of '{side1.name}' face the node of '{side2.name}' at "
-                f"{describe_point(side2.nodes.points[partners[counts.argmax()]])}: mesh both "
-                "sides alike, or "
-                "use matching=DualMortar()"
-            )
-        m = len(partner)
-        P = sp.csr_matrix((np.ones(m), (np.arange(m), partner)), shape=(m, len(side2.nodes.points)))
-        return Matched(np.arange(m), P, side1.nodes.weights, np.zeros(m))
+        _refuse_doubled(side1, side2, partner, size)
 
-    def _find_partners(self, side1: Side, side2: Side, size: float) -> Indices:
+        # A row for each partner of a node, most of which have one.
+        rows = []
+        partners = []
+        shares = []
+        for row, one in enumerate(partner.tolist()):
+            for place, share in several.get(row, [(one, 1.0)]):
+                rows.append(row)
+                partners.append(place)
+                shares.append(share)
+        m = len(rows)
+        shape = (m, len(side2.nodes.points))
+        P = sp.csr_matrix((np.ones(m), (np.arange(m), partners)), shape=shape)
+        weights = side1.nodes.weights[rows] * np.array(shares)
+        return Matched(np.array(rows), P, weights, np.zeros(m))
+
+    def _find_partners(
+        self, side1: Side, side2: Side, size: float
+    ) -> tuple[Indices, dict[int, list[tuple[int, float]]]]:
         """Return the place of the nearest node opposite among those of side 2, -1 for none.
+
+        Of nodes with several partners it is the first one, and all of them by their row, with their
+        shares of the node's facets.
 
         Args:
             side1: side 1.
@@ -200,10 +211,11 @@ class NodeToNode:
         # where several nodes lie at one place, facets tell which is the partner
         surface1 = Surface(x, side1.facets)
         surface2 = Surface(side2.nodes.points, side2.facets)
+        several: dict[int, list[tuple[int, float]]] = {}
         for row, (crowd, apart) in sorted(crowds.items()):
             offset = side2.nodes.points[crowd] - side2.nodes.points[crowd[0]]
             alike = np.linalg.norm(offset, axis=1) <= together[row]
-            chosen = choose_partner(
+            chosen = choose_partners(
                 surface1,
                 row,
                 side1.nodes.normals[row],
@@ -212,12 +224,14 @@ class NodeToNode:
                 apart[alike],
                 ONE_PLACE * reach[row],
             )
-            if chosen < 0:
+            if not chosen or (len(chosen) > 1 and x.shape[1] == 1):
                 _refuse_several(side1, side2, row)
-            partner[row] = chosen
+            partner[row] = chosen[0][0]
+            if len(chosen) > 1:
+                several[row] = chosen
         if turned.any():
             refuse_same_way(side1.name, side2.name, x[np.argmax(turned)])
-        return partner
+        return partner, several
 
 
 # row of a node -> several nodes in front of it, the first the one whose normal is the most
@@ -268,6 +282,27 @@ def _find_opposite(
     return partner, distance[rows, nearest], near.any(axis=1) & ~any_there, crowds
 
 
+def _refuse_doubled(side1: Side, side2: Side, partner: Indices, size: float) -> None:
+    """Raise InputError for nodes of side 1 at different places that face one node of side 2.
+
+    Args:
+        side1: side 1, of m nodes.
+        side2: side 2.
+        partner: (m,) what they face, places on side 2.
+        size: that of the mesh [m].
+    """
+    order = np.argsort(partner, kind="stable")
+    points = side1.nodes.points[order]
+    again = np.diff(partner[order]) == 0
+    elsewhere = np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-9 * size
+    for row in np.flatnonzero(again & elsewhere)[:1]:
+        raise InputError(
+            f"several nodes of '{side1.name}' face the node of '{side2.name}' at "
+            f"{describe_point(side2.nodes.points[partner[order[row]]])}: mesh both sides alike, or "
+            "use matching=DualMortar()"
+        )
+
+
 def _refuse_several(side1: Side, side2: Side, row: int) -> None:
     """Raise InputError for a node of side 1 that faces several nodes of side 2.
 
@@ -289,9 +324,7 @@ def _refuse_several(side1: Side, side2: Side, row: int) -> None:
     mortar = "matching=DualMortar()"
     if max(side1.facets.shape[1], side2.facets.shape[1]) > (2 if d == 2 else 4):
         mortar = f"degree=1 and {mortar}"
-    raise InputError(
-        f"{where}, as a stone does on two stones, and no single one is its partner: use {mortar}"
-    )
+    raise InputError(f"{where}, which have no facets of their own in front of it: use {mortar}")
 
 
 def refuse_same_way(name1: str, name2: str, point: Array) -> None:

@@ -36,10 +36,11 @@ from ..body.space import FemSpace
 from ..mesh.tagged_mesh import Facets
 from .borrowing import Borrowed, borrow
 from .bubbles import average_bubbles
+from .conditions import Facing, NodalConditions
 from .counting import census_of_all, tell
 from .covering import LEAST_SHARE
 from .faces import check_angle, gather_boundary, split_at_corners, tell_corners
-from .frames import Facing, NodalConditions, snap_to_axes, surface_of
+from .frames import snap_to_axes, surface_of
 from .hinges import find_hinges, refuse_hinges
 from .matching import Matched, Matching, NodeToNode, Side
 from .nodes import Nodes, everywhere, join_nodes
@@ -161,7 +162,7 @@ def contact_pair(
     )
     if some_uncovered:
         surface = replace(surface, uncovered=uncovered)
-    return replace(surface, **make_prescribed_motion(space, conditions))
+    return replace(surface, **make_prescribed_motion(space, conditions, surface))
 
 
 def _check_pair(

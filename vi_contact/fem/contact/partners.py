@@ -4,7 +4,7 @@ Nodes of different bodies, or of both faces of a joint, may coincide. Which of t
 follows from the facets around it: a partner must have facets of side 2 in front of them. If one
 partner has all of these it is the one, and what the others have lies beside it, as in a column of
 stones beside another column. If each has a part of them, as two stones under the middle of a third
-one have, no single partner is right.
+one have, the node faces all of them, each with the facets in front of it.
 """
 
 from dataclasses import dataclass
@@ -34,6 +34,23 @@ class Surface:
         """Return the points (m, v, d) [m] of the m facets at a node."""
         return self.points[self.facets[(self.facets == node).any(axis=1)]]
 
+    def sizes_around(self, node: int) -> Array:
+        """Return the sizes (m,) of the facets at a node: lengths [m], areas [m²], 1 of bars."""
+        corners = self.around(node)
+        edges = corners[:, 1:] - corners[:, :1]
+        if corners.shape[2] == 3:
+            areas = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+            if corners.shape[1] != 4:
+                return areas
+            # Of quadrilaterals, in any order of their vertices: the diagonals span the most.
+            for i, j, k in ((0, 1, 2), (1, 0, 2), (2, 0, 1)):
+                across = np.cross(edges[:, i], edges[:, k] - edges[:, j])
+                areas = np.maximum(areas, np.linalg.norm(across, axis=1))
+            return areas
+        if edges.shape[1] == 0:
+            return np.ones(len(corners))
+        return np.asarray(np.linalg.norm(edges, axis=2).max(axis=1))
+
 
 def in_front(surface1: Surface, node: int, normal: Array, surface2: Surface, partner: int) -> Mask:
     """Return a mask (m,) of the facets at a node that facets at its partner lie in front of.
@@ -57,7 +74,7 @@ def in_front(surface1: Surface, node: int, normal: Array, surface2: Surface, par
     return covered
 
 
-def choose_partner(
+def choose_partners(
     surface1: Surface,
     node: int,
     normal: Array,
@@ -65,8 +82,8 @@ def choose_partner(
     partners: Indices,
     apart: Array,
     close: float,
-) -> int:
-    """Choose among several partners the one that a node of side 1 faces.
+) -> list[tuple[int, float]]:
+    """Choose among several nodes those that a node of side 1 faces.
 
     Args:
         surface1: side 1.
@@ -80,15 +97,25 @@ def choose_partner(
         close: that distance [m].
 
     Returns:
-        the place of the partner on side 2, -1 where no single one is right.
+        (place on side 2, share of the node's facets) of each partner; none where partners share a
+        facet, or where one is nearer than another and neither has all facets.
     """
     seen = np.array([in_front(surface1, node, normal, surface2, partner) for partner in partners])
     facing = np.flatnonzero(seen.any(axis=1))
     if len(facing) < 2:
-        return int(partners[facing[0] if len(facing) else 0])
+        return [(int(partners[facing[0] if len(facing) else 0]), 1.0)]
     nearest = facing[np.argmin(apart[facing])]
-    alone = np.sum(apart[facing] <= apart[nearest] + close) == 1
-    return int(partners[nearest]) if alone and seen[nearest].all() else -1
+    beside = apart[facing] <= apart[nearest] + close
+    if np.sum(beside) == 1:
+        return [(int(partners[nearest]), 1.0)] if seen[nearest].all() else []
+
+    # Each of several partners has the facets in front of it for itself.
+    seen = seen[facing]
+    if not beside.all() or (seen.sum(axis=0) > 1).any():
+        return []
+    sizes = seen @ surface1.sizes_around(node)
+    shares = sizes / sizes.sum()
+    return list(zip(partners[facing].tolist(), shares.tolist(), strict=True))
 
 
 def _within(ways: Array, arm: Array) -> Mask:

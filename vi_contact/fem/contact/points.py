@@ -13,7 +13,8 @@ from ...core.obstacles import Obstacle, check_gap, locate_obstacle
 from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem
 from ..matrices.own_matrices import MatrixSpace
-from .frames import Facing, NodalConditions, snap_to_axes, surface_of
+from .conditions import Facing, NodalConditions
+from .frames import snap_to_axes, surface_of
 from .nodes import Nodes
 
 OWNER = "contact_points"

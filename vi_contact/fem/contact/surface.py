@@ -34,6 +34,7 @@ from ..mesh.group_checks import facets_of
 from ..mesh.tagged_mesh import Facets
 from .borrowing import borrow
 from .bubbles import average_bubbles
+from .conditions import NodalConditions, list_faced
 from .counting import census_on_ranks, tell
 from .faces import (
     check_angle,
@@ -43,17 +44,11 @@ from .faces import (
     split_at_corners,
     tell_corners,
 )
-from .frames import (
-    Facing,
-    NodalConditions,
-    NodalFrames,
-    gather_frame_data,
-    snap_to_axes,
-    surface_of,
-)
+from .frames import FemSurface, NodalFrames, gather_frame_data, snap_to_axes, surface_of
 from .hinges import gather_points, mark_hinges, refuse_hinges
 from .matching import EDGE_ON
 from .nodes import Nodes, ask_alike, everywhere, gather_rows, join_nodes, slots_of
+from .traced import find_own_tangents
 from .watching import Watched, sort_held, watch_nodes
 
 log = logging.getLogger(__name__)
@@ -176,11 +171,13 @@ def contact_surface(
     surface = surface_of(
         space, [conditions], gap0=gap, weights=weights, censuses=(census,), watched=watched
     )
-    return replace(surface, **make_prescribed_motion(space, conditions))
+    return replace(surface, **make_prescribed_motion(space, conditions, surface))
 
 
-def make_prescribed_motion(space: FemSpace, conditions: NodalConditions) -> dict[str, Any]:
-    """Return ``motion`` and ``slide`` of conditions that face prescribed nodes. Collective.
+def make_prescribed_motion(
+    space: FemSpace, conditions: NodalConditions, surface: FemSurface
+) -> dict[str, Any]:
+    """Return ``motion`` and slides of conditions that face prescribed nodes. Collective.
 
     Such nodes move like an obstacle. Bubbles of edges count as well: a prescribed vertex moves the
     mid-points that they are measured from.
@@ -188,17 +185,20 @@ def make_prescribed_motion(space: FemSpace, conditions: NodalConditions) -> dict
     Args:
         space: the body's unknowns.
         conditions: this rank's.
+        surface: what they are.
 
     Returns:
-        functions of t [s], (m,) and (m, d - 1) [m], by the names of a ``ContactSurface``; nothing
-        where what conditions face is not moved.
+        functions of t [s], (m,) and (m, d - 1) [m], by the names of a ``FemSurface``; nothing where
+        what conditions face is not moved.
     """
-    faced = _list_faced(conditions)
+    faced = list_faced(conditions)
     moves = bool(faced) and space.moves
     held = any(part.nodes.held[part.P.indices].any() for part in faced)
     if not moves or not (space.hierarchy or largest(space.comm, held)):
         return {}
-    move = make_obstacle_motion(space, [conditions])
+    traced = surface.traces is not None
+    move = make_obstacle_motion(space, [conditions], traced=traced)
+    alone = make_obstacle_motion(space, [conditions], traced=True)
 
     def motion(t: float) -> Array:
         towards, _ = move(space.evaluate_prescribed(t))
@@ -208,11 +208,15 @@ def make_prescribed_motion(space: FemSpace, conditions: NodalConditions) -> dict
         _, along = move(space.evaluate_prescribed(t))
         return along
 
-    return {"motion": motion, "slide": slide}
+    def own_slide(t: float) -> Array:
+        _, along = alone(space.evaluate_prescribed(t))
+        return along
+
+    return {"motion": motion, "slide": slide, "own_slide": own_slide}
 
 
 def make_obstacle_motion(
-    space: FemSpace, conditions: Sequence[NodalConditions]
+    space: FemSpace, conditions: Sequence[NodalConditions], *, traced: bool = False
 ) -> Callable[[Array], tuple[Array, Array]]:
     """Return a function that tells how far prescribed nodes move as obstacles. Collective.
 
@@ -222,19 +226,24 @@ def make_obstacle_motion(
     Args:
         space: the bodies' unknowns.
         conditions: this rank's m conditions, one part after the other.
+        traced: whether the tangents are those of conditions as traces.
 
     Returns:
         U (owned nodes, d), zero at free components -> (m,) and (m, d - 1) [m]; collective too.
     """
     # tangents of each condition that are free, and its vectors
-    frames = NodalFrames(*gather_frame_data(conditions))
-    free = ~join_nodes([part.nodes for part in conditions]).held
-    columns = list_tangential_columns(frames.column, space.dimension)
-    free = np.take_along_axis(free, columns, axis=1) & frames.rubs
-    tangents = make_tangent_vectors(frames.directions, frames.place)
-    directions = frames.directions
+    if traced:
+        directions = np.concatenate([part.directions for part in conditions])
+        tangents, free = find_own_tangents(conditions)
+    else:
+        frames = NodalFrames(*gather_frame_data(conditions))
+        free = ~join_nodes([part.nodes for part in conditions]).held
+        columns = list_tangential_columns(frames.column, space.dimension)
+        free = np.take_along_axis(free, columns, axis=1) & frames.rubs
+        tangents = make_tangent_vectors(frames.directions, frames.place)
+        directions = frames.directions
     # the nodes that conditions of any rank face, each once
-    faced = [_list_faced(part) for part in conditions]
+    faced = [list_faced(part) for part in conditions]
     own = [np.zeros(0, dtype=np.int64)]
     for others in faced:
         own += [other.nodes.numbers for other in others]
@@ -258,11 +267,6 @@ def make_obstacle_motion(
         return -np.sum(x * directions, axis=1), np.einsum("ijk,ij->ik", tangents, x) * free
 
     return move
-
-
-def _list_faced(part: NodalConditions) -> list[Facing]:
-    """Return all that displacements of conditions are relative to: what they face, and bubbles."""
-    return [other for other in (part.facing, *part.bubbles) if other is not None]
 
 
 def _make_question(

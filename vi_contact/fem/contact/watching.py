@@ -20,7 +20,7 @@ import numpy as np
 from ...core.algebra import Array, Mask, from_each, largest
 from ...core.checks import describe_point
 from ...core.errors import InputError
-from .frames import Facing
+from .conditions import Facing
 from .nodes import Nodes
 
 ROUND_OFF = 1e-9  # of the largest motion and gap of the nodes

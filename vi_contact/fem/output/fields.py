@@ -21,6 +21,7 @@ import numpy as np
 from ...core.algebra import Array, Indices, from_each, on_first
 from ...core.arguments import check_fields
 from ...core.checks import column_name
+from ...core.corners import find_tangents
 from ...core.errors import InputError
 from ...core.files import (
     FIELDS,
@@ -445,6 +446,12 @@ def _turn_to_axes(problem: ContactProblem, tangential: Array) -> Array:
     """Return vectors at the owned nodes (k, d) of components in nodal tangents (m, d - 1)."""
     space = cast(NodalSpace, problem.system.space)
     surface = problem.surface
+    if surface.traces is not None:
+        # vectors of conditions that share a node add up there
+        vectors = np.einsum("kdc,kc->kd", find_tangents(surface), tangential)
+        nodal = np.zeros((len(space.nodes), space.dimension))
+        np.add.at(nodal, blocks_of_conditions(problem), vectors)
+        return nodal
     in_frames = surface.reaction_load(np.zeros(surface.count), len(space.ids), tangential)
     # forces and motions turn alike here, as tangents are at right angles to all that is oblique
     along = surface.along_axes(in_frames)
@@ -470,7 +477,10 @@ def compute_gap(problem: ContactProblem, state: State) -> Array:
 def blocks_of_conditions(problem: ContactProblem) -> Indices:
     """Return the owned nodes (m,), by their places, of this rank's conditions."""
     space = cast(NodalSpace, problem.system.space)
-    return np.asarray(space.blocks_of(space.ids[problem.surface.owned] // space.dimension))
+    surface = problem.surface
+    if surface.traces is not None:
+        return np.asarray(space.blocks_of(cast(Indices, surface.nodes)))
+    return np.asarray(space.blocks_of(space.ids[surface.owned] // space.dimension))
 
 
 def between(problem: ContactProblem, nodal: Array, mean: Any = np.mean) -> Array:

@@ -187,8 +187,12 @@ class NodalWork:
         # of each row of works one for every motion, and how far held nodes move obstacles then
         forms = [*self._forms, *self._load_forms]
         rows: list[list[Any]] = [[] for _ in forms]
-        conditions = getattr(self._problem.surface, "parts", ())
-        move_obstacles = make_obstacle_motion(space, conditions) if conditions else None
+        surface = self._problem.surface
+        conditions = getattr(surface, "parts", ())
+        move_obstacles = None
+        if conditions:
+            traced = surface.traces is not None
+            move_obstacles = make_obstacle_motion(space, conditions, traced=traced)
         self._direct: list[tuple[Array, Array]] = []
         densities = self._densities()
         for where, centre, cells, beyond in parts:

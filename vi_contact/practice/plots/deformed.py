@@ -198,10 +198,9 @@ def contact_states(history: Mapping[str, Array]) -> Array:
 def compute_tangents(contact: Geometry) -> Array:
     """Compute the tangents (m, d, d - 1) of slip and traction_t in a history.
 
-    What is at one place is one node.
+    What is at one place is one node, unless each condition has tangents of its own.
     """
-    _, node = np.unique(contact.points, axis=0, return_inverse=True)
-    return make_tangent_vectors(contact.normals, node.ravel())
+    return make_tangent_vectors(contact.normals, contact.frame_nodes)
 
 
 @check_arguments

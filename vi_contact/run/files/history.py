@@ -46,6 +46,7 @@ GEOMETRY = {
     "gap0": "m",
     "bilateral": "-",
     "uncovered": "-",
+    "alone": "-",
 }
 PUSH = 1.0  # seconds after which rows are pushed onto the medium again
 SAVE = 10.0  # seconds after which history.h5 is rewritten again

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ...core.algebra import Array, Mask
+from ...core.algebra import Array, Indices, Mask
 from ...core.arguments import check_arguments
 from ...core.checks import SHOWN, quote
 from ...core.errors import InputError, is_of_machine
@@ -50,7 +50,7 @@ _KINDS: dict[str, type | tuple[type, ...]] = {  # of the entries of summary.json
 class ContactGeometry:
     """Hold contact points as group ``contact`` of history.h5 has them: see ``ContactSurface``.
 
-    ``uncovered`` is None in runs before 0.3, which do not tell.
+    ``uncovered`` and ``alone`` are None in runs before 0.3, which do not tell.
     """
 
     points: Array
@@ -59,6 +59,17 @@ class ContactGeometry:
     gap0: Array
     bilateral: Mask
     uncovered: Mask | None = None
+    alone: Mask | None = None
+
+    @property
+    def frame_nodes(self) -> Indices | None:
+        """Return numbers (m,) of the nodes whose frames hold the tangents of their conditions.
+
+        What is at one place is one node. It is None where each condition has tangents of its own.
+        """
+        if self.alone is not None and self.alone.any():
+            return None
+        return np.unique(self.points, axis=0, return_inverse=True)[1].ravel()
 
 
 @dataclass(frozen=True)
@@ -281,13 +292,13 @@ def _read_arrays(
             gap0=group["gap0"][()],
             bilateral=group["bilateral"][()],
             uncovered=group["uncovered"][()].astype(bool) if "uncovered" in group else None,
+            alone=group["alone"][()].astype(bool) if "alone" in group else None,
         )
 
         # What is damaged may have any shapes: one number, or one vector, for each point.
         count = len(geometry.weights)
         numbers = [geometry.weights, geometry.gap0, geometry.bilateral]
-        if geometry.uncovered is not None:
-            numbers.append(geometry.uncovered)
+        numbers += [mask for mask in (geometry.uncovered, geometry.alone) if mask is not None]
         vectors = np.shape(geometry.points)
         fit = all(np.shape(values) == (count,) for values in numbers)
         fit = fit and len(vectors) == 2 and vectors[0] == count

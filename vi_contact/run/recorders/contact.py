@@ -8,6 +8,7 @@ import numpy as np
 
 from ...core.algebra import Array, Mask, total
 from ...core.arguments import check_fields
+from ...core.corners import find_tangents
 from ...core.problem import ContactProblem
 from ...core.step import AXES, Columns, Report, Row, State, find_slipping
 from ...core.surfaces import ContactSurface
@@ -253,6 +254,10 @@ class Contact:
         """Return the components [N] of the friction force on the body, -Σ r_t t. Collective."""
         surface = self._problem.surface
         system = self._problem.system
+        if surface.traces is not None and state.r_t is not None:
+            along = np.einsum("kdc,kc->d", find_tangents(surface), state.r_t)
+            forces: list[float] = (0.0 - surface.comm.sum(along)).tolist()
+            return forces
         load = surface.reaction_load(np.zeros(surface.count), system.rows, state.r_t)
         force = 0.0 - surface.comm.sum(system.influence.T @ surface.along_axes(load))
         return force.tolist()

@@ -155,7 +155,8 @@ class Part:
         # The tangents of a node are those of all its conditions; run folders do not tell of nodes,
         # whose places stand for them.
         numbers = np.unique(points, axis=0, return_inverse=True)[1].ravel()
-        self.tangents = make_tangent_vectors(normals, getattr(geometry, "nodes", numbers))[chosen]
+        nodes = getattr(geometry, "frame_nodes", numbers)
+        self.tangents = make_tangent_vectors(normals, nodes)[chosen]
         self.fit = self._fit_motion().T
         uncovered = getattr(geometry, "uncovered", None)
         covered = np.ones(len(places), dtype=bool) if uncovered is None else ~uncovered[chosen]

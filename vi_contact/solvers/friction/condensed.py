@@ -11,10 +11,11 @@ With the unit vectors E of the normal and F of the tangential unknowns, x_free =
 A law that depends on the slip rate makes this a sequence of such problems: ``slip_rate``.
 
 Tangential unknowns that are prescribed carry no reaction: their rows are replaced by those of a
-free spring.
+free spring. Conditions that are traces may depend on one another: ``hyperstatic``.
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +25,9 @@ from ...core.errors import ViContactError
 from ...core.step import Answers, StepProblem, StepResult
 from ...core.surfaces import ContactSurface
 from ...kernels.condensation import Condensation
+from .hyperstatic import Hyperstatic
 from .problem import FrictionMethod, FrictionResult
+from .rings import find_rings
 from .slip_rate import RateIteration
 
 
@@ -65,7 +68,18 @@ class CondensedFriction:
         prescribed = np.flatnonzero(~condensed.movable)
         normal = prescribed // d * d
         self.delassus[prescribed, prescribed] = self.delassus.diagonal()[normal]
-        self._small = method.prepare(self.delassus, surface.everywhere(surface.bilateral))
+        bilateral = surface.everywhere(surface.bilateral)
+        if surface.traces is None:
+            self._small: Any = method.prepare(self.delassus, bilateral)
+        else:
+            self._small = Hyperstatic(
+                method,
+                self.delassus,
+                bilateral,
+                rings=find_rings(surface.traces.every, condensed.movable, d),
+                weights=surface.everywhere(surface.weights),
+                movable=condensed.movable,
+            )
 
     def solve(self, step: StepProblem, rigid: Mask) -> StepResult:
         """Return the answer to a step; ``rigid`` (m,) says which supports are. Collective."""
