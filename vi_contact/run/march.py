@@ -113,6 +113,7 @@ class March(Stepper):
                     size: self.prepared[size] for size in sizes if size in self.prepared
                 }
                 self.passes = {size: self.passes[size] for size in sizes if size in self.passes}
+                self.joints = {size: self.joints[size] for size in sizes if size in self.joints}
 
             # The scheme's memory of earlier steps is for steps of one length.
             self.state = self._convert_state(dt)

@@ -21,6 +21,7 @@ from ..laws.mass import ConsistentMass
 from ..schemes.trapezoidal import Trapezoidal
 from ..schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from ..solvers.automatic import Automatic
+from .joint_steps import refuse_scheme
 from .loose_bodies import refuse_loose_bodies
 from .time_steps import TimeSteps, plan_steps
 
@@ -111,6 +112,7 @@ def choose_method(
     with together(comm):  # what is the user's own may fail on one rank
         method.bind()
         problem.equations.forget_loads()
+        refuse_scheme(problem, scheme)
         scheme.check(problem)
         for solver in method.solvers:
             solver.check(problem)
@@ -130,7 +132,7 @@ def with_defaults(
 
     Without a scheme: the trapezoidal rule on redistributed mass; with an impact law, with mass at
     the contact nodes asked for, or of a body that is not linear, the Zienkiewicz-Wood-Taylor step
-    at phi = ½, which never gains energy of a linear body. Without a mass: the scheme's, and the
+    at phi = ½, which never gains energy of a linear body; and with a joint. Without a mass: the scheme's, and the
     consistent one of a body that is not linear.
 
     Args:
@@ -143,7 +145,7 @@ def with_defaults(
         check_problem_given("march", other)
     curved = problem.system.internal is not None
     if scheme is None:
-        massive = curved or isinstance(problem.mass, ConsistentMass)
+        massive = curved or isinstance(problem.mass, ConsistentMass) or problem.joint is not None
         if problem.impact is None and not massive:
             scheme = Trapezoidal()
         else:

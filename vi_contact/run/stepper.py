@@ -22,13 +22,16 @@ from ..core.algebra import EffectiveMatrix, freeze
 from ..core.checks import instance, number
 from ..core.collective import agree, call_user, together, together_if_own
 from ..core.errors import InputError
+from ..core.joints import pose_joint
 from ..core.problem import ContactProblem
 from ..core.protocols import Impact
 from ..core.stage import Stage, average, complete, make_matrix, pose
 from ..core.state_checks import initial_state
 from ..core.step import Report, Scheme, Solver, State, StepProblem
 from ..solvers.certified import TOLERANCE, Certified, CertifiedSolver
+from ..solvers.joints import JointSolver
 from ..solvers.nonlinear import NonlinearSolver
+from . import joint_steps
 from .method import Method, choose_method
 
 FACTORS = 12  # lengths of steps whose factors are kept by a Stepper
@@ -62,6 +65,7 @@ class Stepper:
         dt: length of the last accepted step [s]; nan before the first.
         prepared: length of a step [s] -> its effective matrix and solver, one factor each.
         passes: the like for a body that is not linear.
+        joints: the like for a joint, beside ``prepared``.
     """
 
     method: Method
@@ -69,6 +73,7 @@ class Stepper:
     dt: float
     prepared: dict[float, tuple[EffectiveMatrix, CertifiedSolver]]
     passes: dict[float, NonlinearSolver]
+    joints: dict[float, JointSolver]
 
     def __init__(
         self,
@@ -128,6 +133,7 @@ class Stepper:
         self.dt = float("nan")
         self.prepared = {}
         self.passes = {}
+        self.joints = {}
 
     def attempt(self, dt: float) -> Trial:
         """Make a step from the state, which stays where it is. Collective.
@@ -141,7 +147,7 @@ class Stepper:
         """
         number("Stepper.attempt", "dt", dt, positive=True)
         agree(self.method.problem.surface.comm, "Stepper.attempt", {"dt": dt})
-        for kept in (self.prepared, self.passes):
+        for kept in (self.prepared, self.passes, self.joints):
             while len(kept) >= FACTORS and dt not in kept:
                 oldest = next(iter(kept))
                 del kept[oldest]  # type: ignore[attr-defined]
@@ -197,17 +203,25 @@ class Stepper:
             stage = scheme.stage(problem, state, dt)
         if surface.watched:
             surface.refuse_driven(stage.t)
-        if problem.equations.internal is None:
+        if problem.joint is not None:
+            step, certified = self._solve_joint(stage, state, dt)
+        elif problem.equations.internal is None:
             stage, step, certified = self._solve_linear(stage, state, dt)
         else:
             step, certified = self._solve_nonlinear(stage, dt)
         answer = complete(stage, step, certified.result)
+        moving = answer
+        if step.joint is not None:
+            answer = joint_steps.release(step, answer)
+            moving = joint_steps.relieve(step, answer)
 
         # Displacements and velocities at its end: of the scheme, then of the impact law.
         with together_if_own(surface.comm, scheme):
             free = scheme.finish(problem, state, stage, answer, dt)
         with together_if_own(surface.comm, problem.impact or scheme):
             new = after_impact(problem, scheme, state, free, dt)
+        if step.joint is not None:
+            new = joint_steps.commit(new, step, certified.result)
         for vector in (free.u, free.v, new.u, new.v):
             freeze(vector)  # states are handed out, and the next step is made of them
         return Report(
@@ -219,7 +233,7 @@ class Stepper:
             result=certified.result,
             certificate=certified.certificate,
             # formed only if some recorder asks for it
-            averages=partial(average, problem, stage, answer, state, free),
+            averages=partial(average, problem, stage, moving, state, free),
             escalated=certified.escalated,
         )
 
@@ -250,6 +264,24 @@ class Stepper:
                 stage = scheme.press(problem, state, stage, step, dt)
             step = pose(problem, stage, A)
         return stage, step, solver.solve(step)
+
+    def _solve_joint(self, stage: Stage, state: State, dt: float) -> tuple[StepProblem, Certified]:
+        """Solve a step with a joint: passes until its strength is that of the answer.
+
+        Args:
+            stage: the balance.
+            state: at the beginning of the step.
+            dt: length of the step [s].
+        """
+        problem = self.method.problem
+        if dt not in self.joints:
+            method = self.method
+            A = make_matrix(problem.equations, stage)
+            whole = CertifiedSolver(problem, A, stage.scale, method.solvers, method.tolerance)
+            self.prepared[dt] = (A, whole)
+            self.joints[dt] = JointSolver(whole.solve, whole.first, method.tolerance)
+        base = pose(problem, stage, self.prepared[dt][0])
+        return self.joints[dt].solve(base, pose_joint(problem, state, dt))
 
     def _solve_nonlinear(self, stage: Stage, dt: float) -> tuple[StepProblem, Certified]:
         """Solve a step of a body that is not linear: certified passes about the reference.
