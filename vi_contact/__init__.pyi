@@ -59,6 +59,7 @@ from .run import CrossChecked as CrossChecked
 from .run import Energy as Energy
 from .run import ErrorControlled as ErrorControlled
 from .run import HalvedAtImpact as HalvedAtImpact
+from .run import JointEnergy as JointEnergy
 from .run import LargestStrain as LargestStrain
 from .run import Probe as Probe
 from .run import Racking as Racking

@@ -10,6 +10,7 @@ from .method import with_defaults as with_defaults
 from .recorders import BodyMotion as BodyMotion
 from .recorders import Contact as Contact
 from .recorders import Energy as Energy
+from .recorders import JointEnergy as JointEnergy
 from .recorders import LargestStrain as LargestStrain
 from .recorders import Probe as Probe
 from .recorders import Racking as Racking
