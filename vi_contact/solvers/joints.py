@@ -1,17 +1,13 @@
 """Solve a step with a joint by passes, until the strength used is that of the answer.
 
 A pass is a step of the contract with known strengths F, C, mu and P (``core.joints``). Its answer
-opens the joint by g and slips it by w, and the law has other strengths there. Newton's method finds
-the next ones in the displacements du of the contact unknowns that are free, normals of open points
-and tangents of those that slip. With H = (A⁻¹ of these)⁻¹, the stiffness of the bodies there while
-closed points stay closed, and S the slopes of the law,
+opens the joint by g and slips it by w, and the law has other strengths there. Newton's method
+(``joint_newton``) expects an end of the step, and the law there gives the next strengths. Where a
+pass is no better than the best one, a part of Newton's step is gone.
 
-    (H + scale S_F) du_n = scale (F(g) - F)                  and g falls by du_n
-    (H + r_n S_mu e eᵀ) du_t = -e (r_n (mu(w) - mu) + scale (C(g) - C))      along the slip e
-
-and the law at g - du_n, w + e·du_t gives the next strengths. Where the matrix is not positive, the
-joint loses more than the bodies give way: the step has several answers (*snap-back*). Passes
-without Newton's method then go on from the strength before the step, and the log says so.
+Where Newton's matrix is not positive, the joint loses more than the bodies give way: the step has
+several answers (*snap-back*). The next pass then takes the strengths of the answer as they are,
+which goes on from the strength before the step, and the log says so.
 
 With ``Condensed`` all passes are on the contact unknowns (``condensed_passes``), and a step costs
 one forward and one backward substitution as without a joint. Other solvers make whole steps, which
@@ -24,7 +20,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ..core.algebra import Array, max_abs
 from ..core.errors import StepFailure
@@ -34,11 +29,12 @@ from ..core.verify import kkt_residual
 from .acceleration import Anderson
 from .certified import Certified
 from .condensed_passes import CondensedPasses, PassEnd
+from .joint_newton import correct
 from .joint_rates import RatePasses
 
 log = logging.getLogger(__name__)
 
-MOST = 60  # passes of a step
+MOST = 100  # passes of a step
 AIM = 0.1  # of the tolerance: what passes on the contact unknowns come to
 ADVICE = "try a smaller dt, or a joint that loses its strength over a longer way"
 
@@ -135,6 +131,8 @@ class JointSolver:
         surface = base.surface
         small.begin(base)
         lag = np.inf
+        least = np.inf
+        part = 1.0  # of Newton's step that is gone
         snaps = False
         for count in range(1, MOST + 1):
             step = joint.apply(base, used)
@@ -151,14 +149,15 @@ class JointSolver:
             if lag <= AIM * self._tolerance:
                 self.passes.append(count)
                 return self._finish(step, small, push, end)
-            if not snaps:
-                correction = correct(joint, end, small, (g1, s1), there, used, step.scale)
-                if correction is None:
-                    snaps = True
-                    self._tell_snap(base)
-                else:
-                    there = joint.ask(*correction)
-            used = there
+            part = min(1.0, 2.0 * part) if lag < least else 0.5 * part
+            least = min(least, lag)
+            correction = correct(joint, end, small, (g1, s1), there, used, step.scale)
+            if correction is None:
+                snaps = self._tell_snap(base, told=snaps)
+                used = there
+                continue
+            g2, s2 = correction
+            used = joint.ask(g1 + part * (g2 - g1), s1 + part * (s2 - s1))
         raise self._refuse(base, lag)
 
     def _finish(
@@ -202,8 +201,15 @@ class JointSolver:
         self.passes.append(count)
         return self._finish(step, small, push, end)
 
-    def _tell_snap(self, base: StepProblem) -> None:
-        """Log, once a step on rank 0, that it has several answers."""
+    def _tell_snap(self, base: StepProblem, *, told: bool) -> bool:
+        """Log, once a step on rank 0, that it has several answers; return True: it is told.
+
+        Args:
+            base: the step.
+            told: whether this has been done.
+        """
+        if told:
+            return True
         self.snapped += 1
         if base.surface.comm.rank == 0:
             log.info(
@@ -212,6 +218,7 @@ class JointSolver:
                 base.k,
                 base.t,
             )
+        return True
 
     def _refuse(self, base: StepProblem, lag: float) -> StepFailure:
         """Return the error of a step whose strength is not that of its answer."""
@@ -266,87 +273,3 @@ def _extrapolate(acceleration: Anderson, used: Strength, there: Strength) -> Str
     found = np.maximum(acceleration.extrapolate(before, after - before), 0.0)
     tension, cohesion, mu, water = found.reshape(4, -1) / scale[:, None]
     return Strength(tension, np.maximum(cohesion, mu * tension), mu, water)
-
-
-def correct(
-    joint: JointStep,
-    end: PassEnd,
-    small: CondensedPasses,
-    place: tuple[Array, Array],
-    there: Strength,
-    used: Strength,
-    scale: float,
-) -> tuple[Array, Array] | None:
-    """Return where Newton's method expects the end of the step, (openings, slips). Collective.
-
-    None where its matrix is not positive.
-
-    Args:
-        joint: at the beginning of the step.
-        end: of the last pass.
-        small: which has made it.
-        place: openings (m,) and slips (m, d - 1) of its end.
-        there: the strength there [N].
-        used: the strength of the pass [N].
-        scale: how many times newtons its reactions are.
-    """
-    surface = small.surface
-    g1, s1 = place
-    slope = joint.find_slope(g1, s1)
-    columns = np.column_stack(
-        [
-            slope.tension,
-            slope.mu,
-            there.tension - used.tension,
-            there.mu - used.mu,
-            (there.cohesion - there.mu * there.tension)
-            - (used.cohesion - used.mu * used.tension),
-            used.cohesion - used.mu * used.tension + 0.0 * used.mu,
-            used.mu,
-        ]
-    )
-    of_tension, of_mu, dF, dmu, dC, cohesion, mu = np.asarray(surface.everywhere(columns)).T
-    count, width = end.r.shape
-    r_n = np.maximum(end.r[:, 0], 0.0)
-
-    # Which contact unknowns are free, and the springs and forces of the law there.
-    free = np.zeros((count, width), dtype=bool)
-    free[:, 0] = ~end.closed
-    free[:, 1:] = ~end.sticks[:, None]
-    springs = np.zeros((count, width, width))
-    springs[:, 0, 0] = scale * of_tension
-    force = np.zeros((count, width))
-    force[:, 0] = scale * dF
-    if width > 1:
-        way = np.linalg.norm(end.slip, axis=1)
-        e = np.divide(end.slip, way[:, None], out=np.zeros(end.slip.shape), where=way[:, None] > 0)
-        along = e[:, :, None] * e[:, None, :]
-        across = np.eye(width - 1) - along
-        limit = scale * cohesion + mu * r_n
-        turning = np.divide(limit, way, out=np.zeros(count), where=way > 0.0)
-        springs[:, 1:, 1:] = (r_n * of_mu)[:, None, None] * along
-        if width > 2:
-            springs[:, 1:, 1:] += turning[:, None, None] * across
-        force[:, 1:] = -e * (r_n * dmu + scale * dC)[:, None]
-    du = np.zeros((count, width))
-    chosen = np.flatnonzero(free)
-    if len(chosen):
-        H = small.stiffness
-        assert H is not None  # whoever asks has looked
-        matrix = H[np.ix_(chosen, chosen)]
-        for row in range(width):
-            for column in range(width):
-                places = np.arange(count) * width
-                both = np.flatnonzero(free[:, row] & free[:, column])
-                rows = np.searchsorted(chosen, places[both] + row)
-                columns_of = np.searchsorted(chosen, places[both] + column)
-                matrix[rows, columns_of] += springs[both, row, column]
-        try:
-            factor = cho_factor(matrix, lower=True, check_finite=False)
-        except LinAlgError:
-            return None
-        du.ravel()[chosen] = cho_solve(factor, force.ravel()[chosen])
-    own = surface.mine(du)
-    closed = surface.mine(end.closed)
-    g_next = np.where(closed, g1, np.maximum(g1 - own[:, 0], 0.0))
-    return g_next, s1 + own[:, 1:] if width > 1 else s1
