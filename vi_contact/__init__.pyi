@@ -71,6 +71,7 @@ from .run import Solution as Solution
 from .run import Stepper as Stepper
 from .run import contact_values as contact_values
 from .run import cross_check as cross_check
+from .run import joint_uniqueness as joint_uniqueness
 from .run import march as march
 from .run import march_many as march_many
 from .run import quasi_static as quasi_static

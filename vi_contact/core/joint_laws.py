@@ -4,9 +4,13 @@
 """
 
 from collections.abc import Mapping
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
 
 from .algebra import Array
+from .checks import describe_point, refuse
+from .surfaces import ContactSurface
 
 Committed = Mapping[str, Array]
 
@@ -79,3 +83,30 @@ class JointLaw(Protocol):
         self, committed: Committed, g0: Array, g1: Array, s0: Array, s1: Array, dt: float
     ) -> Committed:
         """Return the committed arrays after the step, when it is accepted."""
+
+
+def refuse_overstressed(law: Any, surface: ContactSurface) -> None:
+    """Raise InputError, on all ranks, for points whose prestress is beyond their strength.
+
+    Collective.
+
+    Args:
+        law: of the joint.
+        surface: the contact conditions.
+    """
+    before = getattr(law, "prestress", None)
+    if before is None or before.nucleate or hasattr(law, "at_speed"):
+        return
+    still = np.zeros(surface.count)
+    slip = np.zeros(surface.tangents.shape)
+    strength = law.strength(law.start(surface.count), still, still, slip, slip, 0.0)
+    shear = np.abs(before.spread("shear", surface.count))
+    normal = before.spread("normal", surface.count)
+    beyond = np.flatnonzero(shear > strength.cohesion + strength.mu * normal)
+    sentences = [
+        f"{type(law).__name__}: the shear prestress {shear[point]:g} Pa at "
+        f"{describe_point(surface.points[point])} is beyond the strength there: give less, or "
+        "Prestress(nucleate=True) if a rupture shall start so"
+        for point in beyond[:1]
+    ]
+    refuse(sentences, surface.comm)

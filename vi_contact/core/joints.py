@@ -6,17 +6,19 @@ one. A joint of tensile strength f_t, cohesion c, slope mu and water pressure p 
     0 <= r' = r_n + F - P  ⊥  opening >= 0,    |r_t| <= C + mu (r' - F),    F = f_t w D, …
 
 where F, C = c w D and P = p w are forces [N] that depend on how far the joint has opened and
-slipped. **Known in one pass of a step** they make a step of the contract (``core.step``) for r': the
-load grows by scale B_nᵀ(F - P), the cohesion is C - mu F and the slope mu. So solvers and
-certificates stay as they are. The limit must not be negative: C is taken as max(C, mu F).
+slipped. **Known in one pass
+of a step** they make a step of the contract (``core.step``) for r': the load grows by
+scale B_nᵀ(F - P), the cohesion is C - mu F and the slope mu. So solvers and certificates stay as
+they are. The limit must not be negative: C is taken as max(C, mu F).
 
 What a point has gone through is *committed* with an accepted step and lies in ``State.memory``, an
 array for each name of the law with a row for each condition. So checkpoints hold it, and an attempt
 that is thrown away leaves no trace.
 
-The strength of a step of a scheme is the *mean of the law over the step*, the work over the way: the
-energy is then that under the law, whatever dt is. A static stage has no way but its end, and takes
-the strength there. ``vi_contact.solvers.joints`` finds the strength that is that of the answer.
+The strength of a step of a scheme is the *mean of the law over the step*, the work over the way:
+the energy is then that under the law, whatever dt is. A static stage has no way but its end, and
+takes the strength there. ``vi_contact.solvers.joints`` finds the strength that is that of the
+answer.
 """
 
 from dataclasses import dataclass, replace
@@ -181,8 +183,11 @@ class JointStep:
         shear = np.zeros(self.s0.shape)
         before = getattr(self.law, "prestress", None)
         if before is not None:
-            normal = normal + self.surface.weights * before.normal
-            shear = shear + (self.surface.weights * before.shear)[:, np.newaxis]
+            count = self.surface.count
+            weights = self.surface.weights
+            normal = weights * before.spread("normal", count)
+            if shear.shape[1]:
+                shear[:, 0] = weights * before.spread("shear", count)
         return normal, shear
 
     @property
@@ -190,6 +195,14 @@ class JointStep:
         """Return F - P (m,) [N], by which r' is more than the reaction."""
         assert self.used is not None  # it is known in a pass
         return self.used.tension - self.used.water
+
+    @property
+    def shift(self) -> Array:
+        """Return by how much the bounds of the step are nearer (m,) [m].
+
+        Slip lifts the points, and a spring in series carries the reaction, and not r'.
+        """
+        return self.raised + self.surface.compliance * (self.prestress[0] + self.pull)
 
     def apply(self, base: StepProblem, used: Strength) -> StepProblem:
         """Return the step for r', with a strength [N].
@@ -211,8 +224,7 @@ class JointStep:
         return replace(
             base,
             b=base.b + load,
-            # a spring in series carries the reaction, and not r'
-            bound=base.bound - self.raised - surface.compliance * push,
+            bound=base.bound - joint.shift,
             friction=friction,
             joint=joint,
         )

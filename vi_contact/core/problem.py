@@ -13,7 +13,7 @@ from .checks import array, instance, optional, provides, quote, refuse
 from .collective import Parts, agree
 from .corners import refuse_rubbing
 from .errors import InputError
-from .joint_laws import JointLaw
+from .joint_laws import JointLaw, refuse_overstressed
 from .protocols import EXCITATION, Excitation, FrictionLaw, Frictionless, ImpactLaw, MassLaw
 from .surfaces import ContactSurface
 from .system import Load, SemiDiscreteSystem, evaluate_history
@@ -56,7 +56,9 @@ class ContactProblem:
         object.__setattr__(self, "friction", replace_tuples(self.friction, self.surface, self._own))
         if self.joint is not None:
             joint = on_points(self.joint, self.surface)
-            object.__setattr__(self, "joint", replace_tuples(joint, self.surface, self._own))
+            joint = replace_tuples(joint, self.surface, self._own)
+            object.__setattr__(self, "joint", joint)
+            refuse_overstressed(joint, self.surface)
 
     def _own(self, values: tuple[Any, ...]) -> tuple[Any, ...]:
         """Return those of this rank, of values for the contact points of all ranks."""

@@ -17,7 +17,7 @@ P.-E. Petersson, Cem. Concr. Res. 6 (1976) 773-782 (linear); D. S. Dugdale, J. M
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
@@ -65,6 +65,7 @@ class Joint(OfPoints):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        self.refuse_word("softening", ("linear", "brittle", "constant"))
         self._refuse_softening()
         self.refuse_where(
             compare_fields(
@@ -87,9 +88,8 @@ class Joint(OfPoints):
                     "it opens: leave one of the two out"
                 )
             return
-        has_strength = callable(self.tension) or callable(self.cohesion)
-        has_strength = has_strength or bool(np.any(self.tension)) or bool(np.any(self.cohesion))
-        if has_strength and len(given) != 1:
+        strengths: tuple[Any, ...] = (self.tension, self.cohesion)
+        if any(callable(value) or bool(np.any(value)) for value in strengths) and len(given) != 1:
             raise InputError(
                 "Joint: give either energy or opening, over which tension and cohesion are lost, "
                 "or softening='brittle'"

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ..core.algebra import Array
+from ..core.algebra import Array, freeze
 from ..core.arguments import check_fields
 from ..core.checks import quote
 from ..core.errors import InputError
@@ -64,8 +64,20 @@ class OfPoints:
             name: the field.
             count: number of points.
         """
-        value = _spread(type(self).__name__, name, getattr(self, name), count)
-        return np.broadcast_to(value, (count,))
+        known: dict[tuple[str, int], Array] = self.__dict__.setdefault("_arrays", {})
+        if (name, count) not in known:
+            value = _spread(type(self).__name__, name, getattr(self, name), count)
+            known[name, count] = freeze(np.full(count, value))
+        return known[name, count]
+
+    def refuse_word(self, name: str, words: tuple[str, ...]) -> None:
+        """Raise InputError unless a field is one of some words."""
+        value = getattr(self, name)
+        if value not in words:
+            raise InputError(
+                f"{type(self).__name__}: {name} is {quote(value)}; give "
+                f"{' or '.join(map(quote, words))}"
+            )
 
     def refuse_where(self, wrong: Any, sentence: str) -> None:
         """Raise InputError where a comparison of two fields holds at some point."""

@@ -52,6 +52,10 @@ class RateAndState(OfPoints):
     speed: Annotated[PositiveByPoint | None, Unit("m/s"), "the slip rate at the start"] = None
     prestress: Prestress | None = None
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.refuse_word("law", ("aging", "slip"))
+
     def start(self, count: int) -> Committed:
         """Return "theta" (count,) [s] and "speed" [m/s] at the start.
 

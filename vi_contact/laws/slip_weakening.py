@@ -3,8 +3,8 @@
     mu(S) = static - (static - kinetic) min(S/dc, 1)
 
 S is the length of the way that a point has slipped, dc the distance. Over a step the coefficient is
-the mean over the way, so that the work of friction is the area under the law whatever dt is. Source:
-D. J. Andrews, J. Geophys. Res. 81 (1976) 5679-5687.
+the mean over the way, so that the work of friction is the area under the law whatever dt is.
+Source: D. J. Andrews, J. Geophys. Res. 81 (1976) 5679-5687.
 """
 
 from dataclasses import dataclass

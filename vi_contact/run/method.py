@@ -103,6 +103,7 @@ def choose_method(
 
     # Defaults of what is not said.
     problem, scheme = with_defaults(problem, scheme)
+    refuse_scheme(problem, scheme)
     if first is None:
         first = Automatic()
     method = Method(problem, scheme, [first, *escalation], dt, tolerance)
@@ -112,7 +113,6 @@ def choose_method(
     with together(comm):  # what is the user's own may fail on one rank
         method.bind()
         problem.equations.forget_loads()
-        refuse_scheme(problem, scheme)
         scheme.check(problem)
         for solver in method.solvers:
             solver.check(problem)
@@ -131,9 +131,9 @@ def with_defaults(
     """Return (the problem with a mass matrix, the scheme to run it with).
 
     Without a scheme: the trapezoidal rule on redistributed mass; with an impact law, with mass at
-    the contact nodes asked for, or of a body that is not linear, the Zienkiewicz-Wood-Taylor step
-    at phi = ½, which never gains energy of a linear body; and with a joint. Without a mass: the scheme's, and the
-    consistent one of a body that is not linear.
+    the contact nodes asked for, with a joint, or of a body that is not linear, the
+    Zienkiewicz-Wood-Taylor step at phi = ½, which never gains energy of a linear body. Without a
+    mass: the scheme's, and the consistent one of a body that is not linear.
 
     Args:
         problem: what is marched.
@@ -145,8 +145,8 @@ def with_defaults(
         check_problem_given("march", other)
     curved = problem.system.internal is not None
     if scheme is None:
-        massive = curved or isinstance(problem.mass, ConsistentMass) or problem.joint is not None
-        if problem.impact is None and not massive:
+        massive = isinstance(problem.mass, ConsistentMass) or problem.joint is not None
+        if problem.impact is None and not (curved or massive):
             scheme = Trapezoidal()
         else:
             scheme = ZienkiewiczWoodTaylor()

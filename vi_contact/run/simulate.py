@@ -86,8 +86,8 @@ def simulate(
             and checkpoint_every count base steps.
         t_end: the time [s] until which is marched; give it or ``steps``.
         steps: the number of base steps.
-        record: recorders; None means Energy(), Contact() and, with a joint, JointEnergy(). Time, iterations and certificate are
-            always recorded.
+        record: recorders; None means Energy(), Contact() and, with a joint, JointEnergy(). Time,
+            iterations and certificate are always recorded.
         out: the run folder: history.csv, columns.json, history.h5, summary.json, run.log,
             checkpoint.npz, fields.xdmf. Without it nothing is written. Output of an earlier run in
             the folder is replaced, unless ``restart``.

@@ -12,7 +12,7 @@ is not accepted leaves no trace but its factor, which is kept by the length of t
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -204,7 +204,7 @@ class Stepper:
         if surface.watched:
             surface.refuse_driven(stage.t)
         if problem.joint is not None:
-            step, certified = self._solve_joint(stage, state, dt)
+            stage, step, certified = self._solve_joint(stage, state, dt)
         elif problem.equations.internal is None:
             stage, step, certified = self._solve_linear(stage, state, dt)
         else:
@@ -265,13 +265,18 @@ class Stepper:
             step = pose(problem, stage, A)
         return stage, step, solver.solve(step)
 
-    def _solve_joint(self, stage: Stage, state: State, dt: float) -> tuple[StepProblem, Certified]:
+    def _solve_joint(
+        self, stage: Stage, state: State, dt: float
+    ) -> tuple[Stage, StepProblem, Certified]:
         """Solve a step with a joint: passes until its strength is that of the answer.
 
         Args:
             stage: the balance.
             state: at the beginning of the step.
             dt: length of the step [s].
+
+        Returns:
+            The balance, with the bounds of the joint; the step for r'; its answer.
         """
         problem = self.method.problem
         if dt not in self.joints:
@@ -281,7 +286,8 @@ class Stepper:
             self.prepared[dt] = (A, whole)
             self.joints[dt] = JointSolver(whole.solve, whole.first, method.tolerance)
         base = pose(problem, stage, self.prepared[dt][0])
-        return self.joints[dt].solve(base, pose_joint(problem, state, dt))
+        step, certified = self.joints[dt].solve(base, pose_joint(problem, state, dt))
+        return replace(stage, bound=stage.bound - step.joint.shift), step, certified
 
     def _solve_nonlinear(self, stage: Stage, dt: float) -> tuple[StepProblem, Certified]:
         """Solve a step of a body that is not linear: certified passes about the reference.

@@ -1,4 +1,4 @@
-"""Find the slip rates of a step with rate-and-state friction, by Newton's method in their logarithms.
+"""Find the slip rates of a step with rate-and-state friction, by Newton's method in ln V.
 
 mu(V) grows with the rate V at fixed state, so the rates of a step are unique; but d mu/d V = a/V is
 so steep at rest that passes with mu taken from the slip before do not converge. With the response G
@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.algebra import Array, max_abs
+from ..core.algebra import Array, Indices, max_abs
 from ..core.errors import StepFailure
 from ..core.joints import JointStep, Strength
 from ..core.step import StepProblem
@@ -39,9 +39,7 @@ class RatePasses:
         self._key = b""
         self._response: Array = np.zeros((0, 0))
 
-    def solve(
-        self, base: StepProblem, joint: JointStep
-    ) -> tuple[StepProblem, Array, PassEnd, int]:
+    def solve(self, base: StepProblem, joint: JointStep) -> tuple[StepProblem, Array, PassEnd, int]:
         """Return the last pass of a step: the step, its push, its end and how many there were.
 
         Collective.
@@ -64,7 +62,7 @@ class RatePasses:
             tangential = surface.tangential_values(step.b - base.b)
             push = np.asarray(surface.everywhere(np.hstack([normal, tangential]))).ravel()
             end = small.make(step, push)
-            before = step.friction.mu
+            before = step.joint.used.mu
             speed = self._find_rates(joint, end, speed, step.scale)
             after, _ = joint.law.at_speed(joint.committed, speed, joint.dt)
             r_n = np.maximum(surface.mine(end.r[:, 0]), 0.0)
@@ -78,9 +76,7 @@ class RatePasses:
             f"still changes by {change:.1e} of the largest: try a smaller dt"
         )
 
-    def _find_rates(
-        self, joint: JointStep, end: PassEnd, speed: Array, scale: float
-    ) -> Array:
+    def _find_rates(self, joint: JointStep, end: PassEnd, speed: Array, scale: float) -> Array:
         """Return the rates (m,) [m/s] at which ways and friction agree. Collective.
 
         Args:
@@ -125,7 +121,7 @@ class RatePasses:
         found[rubbing] = np.exp(y)
         return np.maximum(surface.mine(found), LEAST)
 
-    def _respond(self, rubbing: Array, e: Array, end: PassEnd) -> Array:
+    def _respond(self, rubbing: Indices, e: Array, end: PassEnd) -> Array:
         """Return ways (k, k) [m] of forces along the slips, while closed points stay closed.
 
         Args:

@@ -40,9 +40,9 @@ from ...core.algebra import largest
 from ...core.checks import array, number, quote, whole
 from ...core.errors import InputError, is_of_machine
 from ...core.files import on_root, write_atomically
+from ...core.joints import MEMORY as JOINT
 from ...core.own_files import is_own, open_to_read
 from ...core.problem import ContactProblem
-from ...core.joints import MEMORY as JOINT
 from ...core.step import Scheme, State
 from ..time_steps import TimeSteps
 from .folder import CHECKPOINT, check_format

@@ -24,7 +24,8 @@ class JointEnergy:
 
         loss_fracture = F·dg - change of energy_joint      loss_rubbing = r_t·ds
         loss_closing = -r'·dg                               loss_dilatancy = -(r' - F + P)·d lift
-        work_joint_water = P·dg                             work_prestress = tau0 w·ds - sigma0 w·d gap
+        work_joint_water = P·dg
+        work_prestress = tau0 w·ds - sigma0 w·(dg + d lift)
 
     loss_closing is the work of pressing in steps that close a gap, and of springs.
     """
