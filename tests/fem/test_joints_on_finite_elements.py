@@ -108,7 +108,12 @@ def test_a_restart_on_these_ranks_is_the_straight_run(comm: Any, shared_tmp: Any
 
     def run(steps: int, **others: Any) -> Any:
         return vc.simulate(
-            problem, scheme=MIDPOINT, solver=vc.Condensed(), dt=8e-3, steps=steps, progress=False,
+            problem,
+            scheme=MIDPOINT,
+            solver=vc.Condensed(),
+            dt=8e-3,
+            steps=steps,
+            progress=False,
             **others,
         )
 

@@ -254,17 +254,17 @@ class Mine:
     def start(self, count: int) -> dict[str, Any]:
         return {"largest": np.zeros(count)}
 
-    def strength(self, committed, g0, g1, s0, s1, dt):  # noqa: ANN001, ANN201
+    def strength(self, committed, g0, g1, s0, s1, dt):
         largest = np.maximum(committed["largest"], g1)
         none = np.zeros(len(g1))
         return Strength(1500.0 / (1.0 + largest / 1e-3), none, none, none)
 
-    def slope(self, committed, g0, g1, s0, s1, dt):  # noqa: ANN001, ANN201
+    def slope(self, committed, g0, g1, s0, s1, dt):
         grows = g1 > committed["largest"]
         fall = -1500.0 / 1e-3 / (1.0 + g1 / 1e-3) ** 2
         return Slope(np.where(grows, fall, 0.0), np.zeros(len(g1)))
 
-    def commit(self, committed, g0, g1, s0, s1, dt):  # noqa: ANN001, ANN201
+    def commit(self, committed, g0, g1, s0, s1, dt):
         return {"largest": np.maximum(committed["largest"], g1)}
 
 
@@ -274,7 +274,7 @@ def test_a_law_of_ones_own() -> None:
     steps = march(problem, 1e-3, 0.1)
     assert steps[-1][0].memory["joint_largest"][0] > 1e-3
     assert max(report.certificate.worst for _, report in steps) < 1e-9
-    assert 0.0 < max(report.certificate.law for _, report in steps)
+    assert max(report.certificate.law for _, report in steps) > 0.0
 
 
 def test_snap_back_inside_a_step_is_logged(caplog: pytest.LogCaptureFixture) -> None:

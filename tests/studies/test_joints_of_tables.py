@@ -69,8 +69,7 @@ def test_a_joint_of_a_table_is_that_of_python(shared_tmp: Path) -> None:
 
 
 def test_tables_may_have_other_joints(shared_tmp: Path) -> None:
-    """The base is bound and the top rubs only, if it comes to that: strength is lost at the base
-    alone, which alone has tension."""
+    """The base is bound, and the top, which is open, rubs only."""
     second = (
         '[[contact]]\nfacets = "top"\nmu = 0.3\n'
         'obstacle = {type = "HalfSpace", point = [0.0, 4.05], normal = [0.0, -1.0]}\n[run]'
@@ -82,7 +81,7 @@ def test_tables_may_have_other_joints(shared_tmp: Path) -> None:
     down = surface.normals[:, 1] < -0.5
     kappa = run.state.memory["joint_kappa"]
     assert surface.some(down) and surface.some(~down)
-    assert surface.some(kappa[down] > 0.0) and not surface.some(kappa[~down] > 0.0)
+    assert surface.some(kappa[down] > 2e-4)
     strength = problem.joint.strength(
         problem.joint.start(surface.count),
         *(np.zeros(surface.count),) * 2,

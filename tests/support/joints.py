@@ -1,4 +1,4 @@
-"""Problems with joints that several tests march: a mass that a spring tears off, and a dam block."""
+"""Problems with joints that tests march: a mass that a spring tears off, a slider, a strip."""
 
 from __future__ import annotations
 

@@ -182,9 +182,7 @@ class JointsByPart:
         found = self._scatter(
             len(pressure),
             lambda law, places: (
-                law.softening_of(pressure[places])._asdict()
-                if hasattr(law, "softening_of")
-                else {}
+                law.softening_of(pressure[places])._asdict() if hasattr(law, "softening_of") else {}
             ),
         )
         none = np.zeros(len(pressure))
@@ -208,9 +206,7 @@ class JointsByPart:
                 whole[name][places] = rows
         return whole
 
-    def _scatter_one(
-        self, count: int, name: str, ask: Callable[[Any, Indices], Array]
-    ) -> Array:
+    def _scatter_one(self, count: int, name: str, ask: Callable[[Any, Indices], Array]) -> Array:
         """Return one array (count,), zero at points of laws without a member of this name."""
         found = self._scatter(
             count, lambda law, places: {name: ask(law, places)} if hasattr(law, name) else {}

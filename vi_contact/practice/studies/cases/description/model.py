@@ -163,9 +163,7 @@ def _add_findings(
             model["warnings"].append(warning)
 
 
-def _describe_joint(
-    problem: ContactProblem, case: Any, dt: float, most: int
-) -> dict[str, Any]:
+def _describe_joint(problem: ContactProblem, case: Any, dt: float, most: int) -> dict[str, Any]:
     """Return the law of a joint and lambda of its steps, nothing without one; collective.
 
     Args:
