@@ -53,6 +53,8 @@ class JointLaw(Protocol):
     stage. Arrays that come in are not written to. Optional members, which a frame without them
     takes as said:
 
+    - ``never_negative``: True for a law that has checked its values, whose answers are not looked
+      at. Else False.
     - ``rubs``: False for a joint without any tangential strength. Else True.
     - ``implicit``: False takes the strength that is there before the step. Else True.
     - ``stored(committed, g)``: energy [J/m²] (m,) that the point gives back when it closes. Else 0.

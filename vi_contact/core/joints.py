@@ -138,6 +138,11 @@ class JointStep:
 
     def _weigh(self, found: Strength) -> Strength:
         """Return a strength in newtons, with a limit of friction that is never negative."""
+        weights = self.surface.weights
+        if getattr(self.law, "never_negative", False):  # its values were checked when it was made
+            tension = weights * found.tension
+            cohesion = np.maximum(weights * found.cohesion, found.mu * tension)
+            return Strength(tension, cohesion, found.mu, weights * found.water)
         count = self.surface.count
         owner = type(self.law).__name__
         parts = []
@@ -154,7 +159,6 @@ class JointStep:
                 )
             parts.append(np.broadcast_to(values.astype(float), (count,)))
         tension, cohesion, mu, water = parts
-        weights = self.surface.weights
         tension = weights * tension
         cohesion = np.maximum(weights * cohesion, mu * tension)
         return Strength(tension, cohesion, mu, weights * water)
@@ -354,11 +358,10 @@ def compare(
         limit: mu r' (m,) [N].
         force: the largest load of the step [N], beside which tiny strengths are rounding.
     """
-    differences = [there.tension - used.tension, there.cohesion - used.cohesion]
-    differences += [there.water - used.water, friction]
-    sizes = [there.tension, used.tension, there.cohesion, used.cohesion, there.water, limit]
-    difference = max(max_abs(part) for part in differences)
-    size = max(max_abs(part) for part in sizes)
+    forces = np.concatenate([there.tension, there.cohesion, there.water])
+    before = np.concatenate([used.tension, used.cohesion, used.water])
+    difference = max(max_abs(forces - before), max_abs(friction))
+    size = max(max_abs(forces), max_abs(before), max_abs(limit))
     if surface.comm.size > 1:
         difference, size, force = surface.comm.max(np.array([difference, size, force]))
     if difference == 0.0:
@@ -374,13 +377,12 @@ def read_committed(problem: ContactProblem, state: State) -> Committed:
         state: of a run, a static stage, or made by hand.
     """
     assert problem.joint is not None  # whoever asks has looked
-    first = dict(problem.joint.start(problem.surface.count))
     kept = {
         name.removeprefix(MEMORY): values
         for name, values in state.memory.items()
         if name.startswith(MEMORY)
     }
-    return first | kept
+    return kept or dict(problem.joint.start(problem.surface.count))
 
 
 def keep_committed(state: State, committed: Committed) -> State:

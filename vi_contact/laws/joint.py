@@ -31,6 +31,7 @@ from .joint_values import (
     PositiveByPoint,
     Prestress,
     compare_fields,
+    measure_length,
 )
 
 SHORT = 1e-6  # of dc: over a shorter way the slope of the mean is half that of the law
@@ -102,10 +103,14 @@ class Joint(OfPoints):
 
     def _find_reach(self, count: int) -> Array:
         """Return dc (count,) [m]; 0 for a brittle joint."""
+        return self.make_once("dc", count, lambda: self._make_reach(count))
+
+    def _make_reach(self, count: int) -> Array:
+        """Return dc (count,) [m], out of the energy where it is given."""
         if self.softening == "brittle":
             return np.zeros(count)
         if self.opening is not None:
-            return self.spread("opening", count)
+            return self.spread("opening", count).copy()
         if self.energy is None:
             return np.ones(count)  # of a joint without strength: nothing is lost
         tension = self.spread("tension", count)
@@ -117,6 +122,10 @@ class Joint(OfPoints):
 
     def _find_beta(self, count: int) -> Array:
         """Return c/f_t (count,), by which slip counts as opening; 1 without tension."""
+        return self.make_once("beta", count, lambda: self._make_beta(count))
+
+    def _make_beta(self, count: int) -> Array:
+        """Return c/f_t (count,)."""
         tension = self.spread("tension", count)
         cohesion = self.spread("cohesion", count)
         return np.divide(cohesion, tension, out=np.ones(count), where=tension > 0.0)
@@ -140,15 +149,16 @@ class Joint(OfPoints):
 
     def _mean_left(self, first: Array, last: Array, dc: Array) -> Array:
         """Return the mean of D between two kappa (m,) [m], first <= last."""
+        if self.softening == "brittle":
+            return self._left(last, dc)
         a = np.minimum(first, dc)
         b = np.minimum(last, dc)
-        mean = 1.0 - 0.5 * (a + b) / dc if self.softening == "linear" else np.ones(len(a))
         way = last - first
         # Beyond dc nothing is left, and between them the mean is that of the part below.
         part = np.divide(b - a, way, out=np.ones(len(a)), where=way > 0.0)
-        if self.softening == "brittle":
-            return self._left(last, dc)
-        return np.where(way > 0.0, mean * part, self._left(first, dc))
+        if self.softening == "linear":
+            return (1.0 - 0.5 * (a + b) / dc) * part
+        return np.where(way > 0.0, part, self._left(first, dc))
 
     def _walk(
         self, committed: Committed, g1: Array, s1: Array
@@ -162,7 +172,7 @@ class Joint(OfPoints):
         """
         count = len(g1)
         dc = self._find_reach(count)
-        slip = self._find_beta(count) * np.linalg.norm(s1, axis=1)
+        slip = self._find_beta(count) * measure_length(s1)
         kappa = committed["kappa"]
         opened = committed["opened"]
         turn = np.maximum(kappa, np.hypot(np.minimum(g1, opened), slip))
@@ -201,7 +211,8 @@ class Joint(OfPoints):
 
         tension = self.spread("tension", count) * mean
         cohesion = self.spread("cohesion", count)
-        cohesion = cohesion * self._mean_left(committed["kappa"], last, dc)
+        if not _is_zero(self.cohesion):
+            cohesion = cohesion * self._mean_left(committed["kappa"], last, dc)
         return Strength(tension, cohesion, self.spread("mu", count), np.zeros(count))
 
     def slope(
@@ -251,7 +262,7 @@ class Joint(OfPoints):
         return {
             "kappa": last,
             "opened": np.maximum(committed["opened"], g1),
-            "way": committed["way"] + np.linalg.norm(s1 - s0, axis=1),
+            "way": committed["way"] + measure_length(s1 - s0),
         }
 
     def stored(self, committed: Committed, g: Array) -> Array:

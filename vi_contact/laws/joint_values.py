@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -23,6 +23,8 @@ PositiveByPoint = Annotated[ByPoint, Between(0.0, math.inf, "(]", ABOVE_ZERO)]
 
 class OfPoints:
     """Share what laws of joints do with values by point."""
+
+    never_negative: ClassVar[bool] = True  # the values have been checked
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -64,10 +66,24 @@ class OfPoints:
             name: the field.
             count: number of points.
         """
+
+        def read() -> Array:
+            value = _spread(type(self).__name__, name, getattr(self, name), count)
+            return np.full(count, value)
+
+        return self.make_once(name, count, read)
+
+    def make_once(self, name: str, count: int, make: Callable[[], Array]) -> Array:
+        """Return an array that depends on the values alone, made when it is first asked for.
+
+        Args:
+            name: of the array.
+            count: number of points.
+            make: makes it.
+        """
         known: dict[tuple[str, int], Array] = self.__dict__.setdefault("_arrays", {})
         if (name, count) not in known:
-            value = _spread(type(self).__name__, name, getattr(self, name), count)
-            known[name, count] = freeze(np.full(count, value))
+            known[name, count] = freeze(make())
         return known[name, count]
 
     def refuse_word(self, name: str, words: tuple[str, ...]) -> None:
@@ -83,6 +99,11 @@ class OfPoints:
         """Raise InputError where a comparison of two fields holds at some point."""
         if np.any(wrong):
             raise InputError(f"{type(self).__name__}: {sentence}")
+
+
+def measure_length(s: Array) -> Array:
+    """Return the lengths (m,) of tangential vectors (m, d - 1)."""
+    return np.asarray(np.abs(s[:, 0]) if s.shape[1] == 1 else np.linalg.norm(s, axis=1))
 
 
 def compare_fields(check: Callable[..., Any], *values: Any) -> Any:

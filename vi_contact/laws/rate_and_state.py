@@ -21,7 +21,13 @@ import numpy as np
 from ..core.algebra import Array
 from ..core.joint_laws import Committed, Slope, Strength
 from ..core.quantities import RATIO, Unit
-from .joint_values import NotNegativeByPoint, OfPoints, PositiveByPoint, Prestress
+from .joint_values import (
+    NotNegativeByPoint,
+    OfPoints,
+    PositiveByPoint,
+    Prestress,
+    measure_length,
+)
 
 FAR = 20.0  # arsinh(e^z) is z + ln 2 to the last digit above
 
@@ -124,7 +130,7 @@ class RateAndState(OfPoints):
             s1: slips at its end.
             dt: its length [s].
         """
-        speed = np.linalg.norm(s1 - s0, axis=1) / dt
+        speed = measure_length(s1 - s0) / dt
         none = np.zeros(len(speed))
         moves = speed > 0.0
         mu, _ = self.at_speed(committed, np.where(moves, speed, 1.0), dt)
@@ -143,7 +149,7 @@ class RateAndState(OfPoints):
             s1: slips at its end.
             dt: its length [s].
         """
-        way = np.linalg.norm(s1 - s0, axis=1)
+        way = measure_length(s1 - s0)
         moves = way > 0.0
         _, rise = self.at_speed(committed, np.where(moves, way / dt, 1.0), dt)
         return Slope(np.zeros(len(way)), np.divide(rise, way, out=0.0 * way, where=moves))
@@ -161,7 +167,7 @@ class RateAndState(OfPoints):
             s1: slips at its end.
             dt: its length [s].
         """
-        speed = np.linalg.norm(s1 - s0, axis=1) / dt
+        speed = measure_length(s1 - s0) / dt
         rests = speed <= 0.0
         theta, _ = self._age(committed["theta"], np.where(rests, 1.0, speed), dt)
         return {"theta": np.where(rests, committed["theta"] + dt, theta), "speed": speed}

@@ -21,6 +21,7 @@ from .joint_values import (
     PositiveByPoint,
     Prestress,
     compare_fields,
+    measure_length,
 )
 
 SHORT = 1e-6  # of the distance: over a shorter way the slope of the mean is half that of the law
@@ -83,7 +84,7 @@ class SlipWeakening(OfPoints):
         count = len(s1)
         kinetic, drop, distance = self._read(count)
         first = committed["way"]
-        way = np.linalg.norm(s1 - s0, axis=1)
+        way = measure_length(s1 - s0)
 
         # The mean of 1 - S/dc over the part of the way below dc; beyond it nothing is left.
         a = np.minimum(first, distance)
@@ -108,7 +109,7 @@ class SlipWeakening(OfPoints):
         """
         count = len(s1)
         kinetic, drop, distance = self._read(count)
-        way = np.linalg.norm(s1 - s0, axis=1)
+        way = measure_length(s1 - s0)
         last = committed["way"] + way
         there = kinetic + drop * (1.0 - np.minimum(last / distance, 1.0))
         mean = self.strength(committed, g0, g1, s0, s1, dt).mu
@@ -130,7 +131,7 @@ class SlipWeakening(OfPoints):
             s1: slips at its end.
             dt: its length [s]; not read.
         """
-        return {"way": committed["way"] + np.linalg.norm(s1 - s0, axis=1)}
+        return {"way": committed["way"] + measure_length(s1 - s0)}
 
     def softening_of(self, pressure: Array) -> Slope:
         """Return the steepest loss of mu [1/m], as a positive number.

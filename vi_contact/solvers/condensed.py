@@ -238,9 +238,9 @@ class PreparedCondensed:
             compliance = np.zeros(len(friction.delassus))
             compliance[:: len(compliance) // surface.total] = springs
 
-            def rub(step: StepProblem, free: Array) -> Any:
+            def rub(step: StepProblem, free: Array, near: Array | None) -> Any:
                 """Solve the small problem with friction."""
-                answer, held, values = friction.reactions(step, free, self._rigid)
+                answer, held, values = friction.reactions(step, free, self._rigid, near)
                 q = values.reshape(answer.r.shape) - free.reshape(answer.r.shape)
                 moved = q + (friction.delassus @ answer.r.ravel()).reshape(q.shape)
                 found = (answer.r, moved, answer.active, answer.stick, held, values)
@@ -257,10 +257,10 @@ class PreparedCondensed:
         condensed, small = self._condense_normal()
         G = condensed.flexibility
 
-        def press(step: StepProblem, free: Array) -> Any:
+        def press(step: StepProblem, free: Array, near: Array | None) -> Any:
             """Solve the small problem without friction."""
             bound = surface.everywhere(step.bound)
-            guess = surface.everywhere(step.active)
+            guess = surface.everywhere(step.active) if near is None else near[:, 0] > 0.0
             answer: LCPResult = small.solve(bound - free, guess)
             moved = (bound - free + G @ answer.r)[:, None]
             held = (answer.r != 0.0) & self._rigid

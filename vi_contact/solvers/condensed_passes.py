@@ -60,7 +60,7 @@ class CondensedPasses:
     def __init__(
         self,
         condensed: Condensation,
-        small: Callable[[StepProblem, Array], Any],
+        small: Callable[[StepProblem, Array, Array | None], Any],
         flexibility: Array,
         compliance: Array,
         surface: ContactSurface,
@@ -70,7 +70,7 @@ class CondensedPasses:
 
         Args:
             condensed: A, condensed onto the contact unknowns.
-            small: (step, free motion) -> (r, gap and minus slip, closed, sticks, held, values,
+            small: (step, free motion, reactions to begin with) -> (r, gap and minus slip, closed, sticks, held, values,
                 iterations) of all ranks.
             flexibility: G, with the compliance.
             compliance: of the contact unknowns, over the scale.
@@ -99,15 +99,17 @@ class CondensedPasses:
         """Find the free motion of a step. Collective."""
         self._free = self._condensed.find_free_motion(base.b)
 
-    def make(self, step: StepProblem, push: Array) -> PassEnd:
+    def make(self, step: StepProblem, push: Array, before: PassEnd | None = None) -> PassEnd:
         """Return where a step leads whose loads are those of the base and a push. Collective.
 
         Args:
             step: with its own bound and friction.
             push: the further forces (M d,) at contact unknowns, ``scale`` times newtons.
+            before: the pass before in this step, from which the search begins; None: the first.
         """
+        near = None if before is None else before.r
         free = self._free + self.flexibility @ push - self._compliance * push
-        r, moved, closed, sticks, held, values, iterations = self._small(step, free)
+        r, moved, closed, sticks, held, values, iterations = self._small(step, free, near)
         slip = np.where(sticks[:, None], 0.0, -moved[:, 1:])
         return PassEnd(moved[:, 0], slip, r, closed, sticks, held, values, iterations)
 

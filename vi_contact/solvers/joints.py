@@ -134,10 +134,11 @@ class JointSolver:
         least = np.inf
         part = 1.0  # of Newton's step that is gone
         snaps = False
+        end: PassEnd | None = None
         for count in range(1, MOST + 1):
             step = joint.apply(base, used)
             push = _find_push(step, base, small.width)
-            end = small.make(step, push)
+            end = small.make(step, push, end)
             g1, s1 = joint.end_at(
                 surface.mine(end.gap), surface.mine(end.slip), surface.mine(end.closed)
             )
