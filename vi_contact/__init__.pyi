@@ -59,6 +59,7 @@ from .run import CrossChecked as CrossChecked
 from .run import Energy as Energy
 from .run import ErrorControlled as ErrorControlled
 from .run import HalvedAtImpact as HalvedAtImpact
+from .run import JointEnergy as JointEnergy
 from .run import LargestStrain as LargestStrain
 from .run import Probe as Probe
 from .run import Racking as Racking
@@ -72,6 +73,7 @@ from .run import Solution as Solution
 from .run import Stepper as Stepper
 from .run import contact_values as contact_values
 from .run import cross_check as cross_check
+from .run import joint_uniqueness as joint_uniqueness
 from .run import march as march
 from .run import march_many as march_many
 from .run import quasi_static as quasi_static

@@ -68,8 +68,8 @@ def test_a_stack_slides_or_topples(k: int, mu: float) -> None:
 
 @pytest.mark.parametrize(("half_first", "multiplier"), [(True, 0.642859), (False, 0.650000)])
 def test_walls_have_the_known_bound(half_first: bool, multiplier: float) -> None:
-    """V2.21: 5 x 6 stones of 0.4 x 0.175 m, mu 0.65, pushed in proportion to weight: half stones in the
-    courses 1, 3, 5, and in 2, 4, 6."""
+    """V2.21: 5 x 6 stones of 0.4 x 0.175 m, mu 0.65, pushed in proportion to weight: half stones in
+    the courses 1, 3, 5, and in 2, 4, 6."""
     limit = vc.rigid_limit_load(wall(half_first), mu=0.65)
     assert limit.multiplier == pytest.approx(multiplier, abs=1e-6)
     certified(limit, 0.65)
@@ -130,8 +130,8 @@ def round_arch(n: int, t: float) -> RigidBlocks:
     ids=["straight", "round"],
 )
 def test_arches_stand_down_to_the_known_thickness(make: Any, known: dict[int, float]) -> None:
-    """V2.22: Milankovitch's 0.1075 of the semicircle is reached from below; halving joints lowers it
-    never."""
+    """V2.22: Milankovitch's 0.1075 of the semicircle is reached from below; halving joints never
+    lowers it."""
     found = {n: least_thickness(n, make) for n in known}
     for n, ratio in known.items():
         assert found[n] == pytest.approx(ratio, abs=2e-6)

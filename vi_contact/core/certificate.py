@@ -27,6 +27,9 @@ class Certificate:
         resultant: of static stages, the largest |w·(b - B_nᵀ r_n - B_tᵀ r_t)| over max |w| times
             the sum of |b| and |Bᵀr| on a body, for its rigid motions w that no prescribed
             displacement holds: nodal residuals may be small and add up.
+        law: with a joint, the largest difference between its strength at the answer and the
+            strength that the step was solved with, over the largest strength (``core.joints``); 0
+            without one. A step solved with a wrong strength passes all residuals above.
 
     The references are maxima over all unknowns, so that a wide gap blunts no residual:
     x_ref = max(|x|, |guess|), r_ref = max(|b|, |K u|, |r_n|), t_ref = max(limit, |r_t|,
@@ -41,6 +44,7 @@ class Certificate:
     cone: float = 0.0
     dissipation: float = 0.0
     resultant: float = 0.0
+    law: float = 0.0
 
     @cached_property
     def worst(self) -> float:

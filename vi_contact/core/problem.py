@@ -13,6 +13,7 @@ from .checks import array, instance, optional, provides, quote, refuse
 from .collective import Parts, agree
 from .corners import let_corners_rub
 from .errors import InputError
+from .joint_laws import JointLaw, refuse_overstressed
 from .protocols import EXCITATION, Excitation, FrictionLaw, Frictionless, ImpactLaw, MassLaw
 from .surfaces import ContactSurface
 from .system import Load, SemiDiscreteSystem, evaluate_history
@@ -35,6 +36,8 @@ class ContactProblem:
         impact: the law that changes velocities after a step; None leaves them unchanged.
         excitation: what shakes the ground, one excitation or several.
         mass: the mass law; None leaves the choice to the time scheme.
+        joint: the law of a joint whose strength changes, in the place of ``friction``; None for
+            none. Its values may be functions of the points, and tuples as those of ``friction``.
     """
 
     system: SemiDiscreteSystem
@@ -43,15 +46,22 @@ class ContactProblem:
     impact: ImpactLaw | None = None
     excitation: Excitation | Sequence[Excitation] = ()
     mass: MassLaw | None = None
+    joint: JointLaw | None = None
 
     def __post_init__(self) -> None:
-        laws = {name: Parts(getattr(self, name)) for name in ("friction", "impact", "mass")}
+        names = ("friction", "impact", "mass", "joint")
+        laws = {name: Parts(getattr(self, name)) for name in names}
         if isinstance(self.surface, ContactSurface):
             agree(self.surface.comm, "ContactProblem", laws | {"excitation": self.excitation})
         check_parts(self)
         if self.frictional:
             object.__setattr__(self, "surface", let_corners_rub(self.surface))
         object.__setattr__(self, "friction", replace_tuples(self.friction, self.surface, self._own))
+        if self.joint is not None:
+            joint = on_points(self.joint, self.surface)
+            joint = replace_tuples(joint, self.surface, self._own)
+            object.__setattr__(self, "joint", joint)
+            refuse_overstressed(joint, self.surface)
 
     def _own(self, values: tuple[Any, ...]) -> tuple[Any, ...]:
         """Return those of this rank, of values for the contact points of all ranks."""
@@ -157,6 +167,8 @@ class ContactProblem:
     @property
     def frictional(self) -> bool:
         """Say whether tangential reactions can occur at all."""
+        if self.joint is not None:
+            return self.surface.tangents.shape[1] > 0 and bool(getattr(self.joint, "rubs", True))
         return not isinstance(self.friction, Frictionless)
 
     def slip_origin(self, u: Array, start: float, end: float) -> Array | None:
@@ -185,6 +197,18 @@ class ContactProblem:
             for i, component in enumerate(excitation.direction):
                 total[i] += a * component
         return np.array(total)
+
+
+def on_points(law: Any, surface: ContactSurface) -> Any:
+    """Return a law of a joint with its functions of the points taken at those of this rank.
+
+    A law that has functions says so by ``at_points(points)``, with points (m, d) [m], one that is
+    made of laws of parts by ``on_surface(surface)``.
+    """
+    if hasattr(law, "on_surface"):
+        return law.on_surface(surface)
+    at_points = getattr(law, "at_points", None)
+    return law if at_points is None else at_points(surface.points)
 
 
 def replace_tuples(
@@ -225,6 +249,8 @@ def check_parts(problem: Any) -> None:
     instance(owner, "surface", surface, ContactSurface, remedy)
     remedy = "give Coulomb(mu) or another friction law"
     provides(owner, "friction", problem.friction, ("limit", "slope", "at"), remedy)
+    if problem.joint is not None:
+        _check_joint(problem)
     remedy = "give Inelastic() or another law, or None"
     optional(provides, owner, "impact", problem.impact, ("target", "apply"), remedy)
     if problem.mass is not None:
@@ -255,6 +281,29 @@ def check_parts(problem: Any) -> None:
     defects = (*_find_defects_of_system(system), *_find_defects_of_surface(surface, system, total))
     refuse(defects, surface.comm)
     _refuse_repeated(excitations)
+
+
+def _check_joint(problem: Any) -> None:
+    """Raise InputError for what is no law of a joint, or laws that do not go with one."""
+    owner = "ContactProblem"
+    remedy = "give laws.Joint(…), laws.SlipWeakening(…) or a law of your own"
+    names = ("start", "strength", "slope", "commit")
+    provides(owner, "joint", problem.joint, names, remedy, lacks=("limit",))
+    if not isinstance(problem.friction, Frictionless):
+        raise InputError(
+            f"{owner}: joint and friction are two laws of the same points: give the friction as mu "
+            "of the joint, and leave the other out"
+        )
+    if problem.impact is not None:
+        raise InputError(
+            f"{owner}: an impact law changes velocities of closed points, which a joint holds: "
+            "leave impact out beside a joint"
+        )
+    if problem.surface.some(problem.surface.bilateral):
+        raise InputError(
+            f"{owner}: the surface has bilateral conditions, which never part: give a joint to a "
+            "unilateral surface only"
+        )
 
 
 def _refuse_repeated(excitations: Sequence[Any]) -> None:

@@ -64,7 +64,8 @@ class State:
             says.
         active: (m,) True for closed conditions.
         memory: what a scheme carries besides u and v: vectors (n,), and arrays that are the same on
-            every rank. The class of the scheme says under which names; nobody else reads it.
+            every rank. The class of the scheme says under which names; nobody else reads it. What
+            a joint has gone through is there too, arrays (m, …) (``core.joints``).
         r_t: tangential reactions (m, d - 1) [N] of that step, None without friction.
         certificate: of the equilibrium that the state is; None of states that steps have led to.
     """
@@ -149,6 +150,7 @@ class StepProblem:
     origin: Array | None = None
     internal: Array | None = None
     forces: StepForces | None = None
+    joint: Any = None
 
     def __post_init__(self) -> None:
         rows = self.guess.shape[-1]

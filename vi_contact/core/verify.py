@@ -5,6 +5,7 @@ numpy alone computes, so that the file can be checked by eye.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cache
 from itertools import accumulate
 from typing import Any, NamedTuple
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from .algebra import Array, Comm
 from .certificate import Certificate
 from .collective import ask_limit
+from .joints import judge_strength
 from .step import StepProblem, StepResult
 
 # How far rounding may show in A x, relative to the largest entry of A times that of x; and how
@@ -43,7 +45,10 @@ def kkt_residual(step: StepProblem, result: StepResult, rest: Array | None = Non
     if rest is None and step.forces is not None:
         rest = step.forces.find_rest(result.x)
     (sizes,) = _measure_sizes(step, result, rest)
-    return _make_certificate(step, result, sizes)
+    certificate = _make_certificate(step, result, sizes)
+    if step.joint is None:
+        return certificate
+    return replace(certificate, law=judge_strength(step, result))
 
 
 def kkt_residuals(

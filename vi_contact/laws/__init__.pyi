@@ -14,6 +14,8 @@ from .impact import Elastic as Elastic
 from .impact import ImpulseUpdate as ImpulseUpdate
 from .impact import Inelastic as Inelastic
 from .impact import Newton as Newton
+from .joint import Joint as Joint
+from .joint_values import Prestress as Prestress
 from .mass import ConsistentMass as ConsistentMass
 from .mass import Redistributed as Redistributed
 from .materials import DampingRatio as DampingRatio
@@ -27,4 +29,6 @@ from .materials import Rayleigh as Rayleigh
 from .materials import Solid as Solid
 from .near_fault import NearFaultPulse as NearFaultPulse
 from .orthotropic import Orthotropic as Orthotropic
+from .rate_and_state import RateAndState as RateAndState
+from .slip_weakening import SlipWeakening as SlipWeakening
 from .weight import with_weight as with_weight

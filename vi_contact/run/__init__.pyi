@@ -4,12 +4,14 @@ from .cross_check import CrossChecked as CrossChecked
 from .cross_check import cross_check as cross_check
 from .files.reading import RunFolder as RunFolder
 from .files.reading import read_run as read_run
+from .joint_uniqueness import joint_uniqueness as joint_uniqueness
 from .march import march as march
 from .march_many import march_many as march_many
 from .method import with_defaults as with_defaults
 from .recorders import BodyMotion as BodyMotion
 from .recorders import Contact as Contact
 from .recorders import Energy as Energy
+from .recorders import JointEnergy as JointEnergy
 from .recorders import LargestStrain as LargestStrain
 from .recorders import Probe as Probe
 from .recorders import Racking as Racking

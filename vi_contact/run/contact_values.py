@@ -6,6 +6,7 @@ import numpy as np
 
 from ..core.algebra import Array, Mask
 from ..core.corners import find_tangents
+from ..core.joints import find_limit
 from ..core.problem import ContactProblem
 from ..core.state_checks import check_problem_given, check_sizes
 from ..core.step import State
@@ -75,7 +76,7 @@ def contact_values(
     normal = surface.normal_values(state.u)
     own = {
         "pressure": state.r_n / surface.weights,
-        "limit": problem.friction.limit(state.r_n, surface.weights, 1.0) / surface.weights,
+        "limit": find_limit(problem, state) / surface.weights,
         "gap": surface.gap(state.t) - normal + surface.compliance * state.r_n,
         "active": state.active,
     }

@@ -112,6 +112,7 @@ class March(Stepper):
                 self.prepared = {
                     size: self.prepared[size] for size in sizes if size in self.prepared
                 }
+                self.joints = {size: self.joints[size] for size in sizes if size in self.joints}
 
             # The scheme's memory of earlier steps is for steps of one length.
             self.state = self._convert_state(dt)

@@ -21,6 +21,7 @@ from ..laws.mass import ConsistentMass
 from ..schemes.trapezoidal import Trapezoidal
 from ..schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from ..solvers.automatic import Automatic
+from .joint_steps import refuse_scheme
 from .loose_bodies import refuse_loose_bodies
 from .time_steps import TimeSteps, plan_steps
 
@@ -102,6 +103,7 @@ def choose_method(
 
     # Defaults of what is not said.
     problem, scheme = with_defaults(problem, scheme)
+    refuse_scheme(problem, scheme)
     if first is None:
         first = Automatic()
     method = Method(problem, scheme, [first, *escalation], dt, tolerance)
@@ -129,9 +131,9 @@ def with_defaults(
     """Return (the problem with a mass matrix, the scheme to run it with).
 
     Without a scheme: the trapezoidal rule on redistributed mass; with an impact law, with mass at
-    the contact nodes asked for, or of a body that is not linear, the Zienkiewicz-Wood-Taylor step
-    at phi = ½, which never gains energy of a linear body. Without a mass: the scheme's, and the
-    consistent one of a body that is not linear.
+    the contact nodes asked for, with a joint, or of a body that is not linear, the
+    Zienkiewicz-Wood-Taylor step at phi = ½, which never gains energy of a linear body. Without a
+    mass: the scheme's, and the consistent one of a body that is not linear.
 
     Args:
         problem: what is marched.
@@ -143,8 +145,8 @@ def with_defaults(
         check_problem_given("march", other)
     curved = problem.system.internal is not None
     if scheme is None:
-        massive = curved or isinstance(problem.mass, ConsistentMass)
-        if problem.impact is None and not massive:
+        massive = isinstance(problem.mass, ConsistentMass) or problem.joint is not None
+        if problem.impact is None and not (curved or massive):
             scheme = Trapezoidal()
         else:
             scheme = ZienkiewiczWoodTaylor()

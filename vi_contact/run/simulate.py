@@ -38,7 +38,7 @@ from .files.stored_rows import StoredRows
 from .files.table import Block, Table
 from .files.writer import FieldWriter, Writer
 from .method import Method, choose_method, with_defaults
-from .recorders import Contact, Energy
+from .recorders import Contact, Energy, JointEnergy
 from .recorders.steps import Steps
 from .request import CrossCheck, RunRequest
 from .session import Session
@@ -86,8 +86,8 @@ def simulate(
             and checkpoint_every count base steps.
         t_end: the time [s] until which is marched; give it or ``steps``.
         steps: the number of base steps.
-        record: recorders; None means (Energy(), Contact()). Time, iterations and certificate are
-            always recorded.
+        record: recorders; None means Energy(), Contact() and, with a joint, JointEnergy(). Time,
+            iterations and certificate are always recorded.
         out: the run folder: history.csv, columns.json, history.h5, summary.json, run.log,
             checkpoint.npz, fields.xdmf. Without it nothing is written. Output of an earlier run in
             the folder is replaced, unless ``restart``.
@@ -191,7 +191,7 @@ def open_run(
     comm = request.comm
     folder = None if request.out is None else run_folder(comm, request.out)
     source = _find_source(request.restart, folder)
-    recorders = _list_recorders(request.record)
+    recorders = _list_recorders(request.record, method.problem)
     with lock_folder(comm, folder):
         # The first state: that of the checkpoint, of an earlier stage, or at rest. The scheme adds
         # its memory of earlier steps, which depends on the length of the first one.
@@ -258,10 +258,16 @@ def _find_source(restart: bool | str | Path, folder: Path | None) -> Path | None
     return path.parent if path.suffix == ".npz" else path
 
 
-def _list_recorders(record: Sequence[Recorder] | None) -> list[Recorder]:
-    """Return the recorder of every run, then those that were asked for."""
+def _list_recorders(record: Sequence[Recorder] | None, problem: ContactProblem) -> list[Recorder]:
+    """Return the recorder of every run, then those that were asked for.
+
+    Args:
+        record: asked for; None for those that runs have by themselves.
+        problem: of the run, which may have a joint.
+    """
     if record is None:
-        return [Steps(), Energy(), Contact()]
+        of_joint = [] if problem.joint is None else [JointEnergy()]
+        return [Steps(), Energy(), Contact(), *of_joint]
     return [Steps(), *record]
 
 

@@ -25,6 +25,7 @@ from ..core.certificate import Certificate
 from ..core.checks import describe_point, number, quote, real
 from ..core.collective import Parts, agree, together
 from ..core.errors import InputError
+from ..core.joints import pose_joint
 from ..core.problem import ContactProblem
 from ..core.stage import Affine, Answer, Stage, complete, pose
 from ..core.state_checks import check_problem_given, check_sizes, initial_state
@@ -32,7 +33,9 @@ from ..core.step import Solver, State, StepProblem, StepResult
 from ..solvers.automatic import Automatic
 from ..solvers.certified import TOLERANCE, CertifiedSolver
 from ..solvers.door import refuse_matrix, refuse_nan
+from ..solvers.joints import JointSolver
 from ..solvers.nonlinear import NonlinearSolver
+from . import joint_steps
 from .method import check_methods
 from .proximal import Proximal
 
@@ -40,6 +43,10 @@ log = logging.getLogger(__name__)
 OPEN = 0.05  # of the area that touches at the start: so much may be open at rest without a warning
 TOUCHING = 1e-9  # of the largest coordinate: a gap that is none
 ADVICE = "try another solver, or smaller load steps, and check the data"
+ADVICE_JOINT = (
+    "a joint that snaps back has no equilibrium near the one before: take smaller load steps, or a "
+    "dynamic stage, where inertia decides"
+)
 ADVICE_NONLINEAR = (
     "try smaller load steps, or march with damping where the body may buckle, and check the data"
 )
@@ -141,6 +148,7 @@ class Equilibria:
         self._K = EffectiveMatrix(
             system.K, system.algebra, space=system.space, inertia=(0.0, system.M)
         )
+        joint_steps.refuse_statics(problem)
         refuse_matrix(problem, self._K)
         given = (problem, self._K, 1.0, [solver], tolerance)
         self.solver: Proximal | CertifiedSolver | NonlinearSolver
@@ -155,6 +163,10 @@ class Equilibria:
             )
         else:
             self.solver = NonlinearSolver(*given, advice=ADVICE_NONLINEAR)
+
+        # Passes of a joint: on the contact unknowns, where the stage is one step.
+        first = self.solver.first if isinstance(self.solver, CertifiedSolver) else None
+        self._joints = JointSolver(self.solver.solve, first, tolerance, advice=ADVICE_JOINT)
 
     def _pose_stage(self, old: State, t: float) -> Stage:
         """Return the balance of forces at rest at a time, in d = u - u of the state before.
@@ -210,8 +222,24 @@ class Equilibria:
                 slip0=problem.slip_origin(old.u, old.t, t),
             )
             refuse_nan(step, lambda: problem.static_load)
+            if problem.joint is not None:
+                return self._solve_joint(step, old)
             certified = self.solver.solve(step)
         return _stand_still(old, t, certified.result, certified.certificate)
+
+    def _solve_joint(self, base: StepProblem, old: State) -> State:
+        """Return the equilibrium of a joint, whose strength is that at the end of the stage.
+
+        Args:
+            base: the stage without its joint.
+            old: the state before.
+        """
+        joint = pose_joint(self._problem, old, 0.0, at_end=True)
+        step, certified = self._joints.solve(base, joint)
+        result = certified.result
+        total = replace(result, r_n=result.r_n - step.joint.pull)
+        state = _stand_still(old, base.t, total, certified.certificate)
+        return joint_steps.commit(state, step, result)
 
 
 def _stand_still(

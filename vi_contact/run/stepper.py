@@ -12,7 +12,7 @@ is not accepted leaves no trace but its factor, which is kept by the length of t
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -22,13 +22,16 @@ from ..core.algebra import freeze
 from ..core.checks import instance, number
 from ..core.collective import agree, call_user, together, together_if_own
 from ..core.errors import InputError
+from ..core.joints import pose_joint
 from ..core.problem import ContactProblem
 from ..core.protocols import Impact
 from ..core.stage import Stage, average, complete, make_matrix, pose
 from ..core.state_checks import initial_state
 from ..core.step import Report, Scheme, Solver, State
 from ..solvers.certified import TOLERANCE, CertifiedSolver
+from ..solvers.joints import JointSolver
 from ..solvers.nonlinear import NonlinearSolver
+from . import joint_steps
 from .method import Method, choose_method
 
 FACTORS = 12  # lengths of steps whose factors are kept by a Stepper
@@ -61,12 +64,14 @@ class Stepper:
         state: from which the next attempt starts.
         dt: length of the last accepted step [s]; nan before the first.
         prepared: length of a step [s] -> its solver, with one factor of its effective matrix.
+        joints: the passes of a joint, beside ``prepared``.
     """
 
     method: Method
     state: State
     dt: float
     prepared: dict[float, CertifiedSolver | NonlinearSolver]
+    joints: dict[float, JointSolver]
 
     def __init__(
         self,
@@ -125,6 +130,7 @@ class Stepper:
         self.state = state
         self.dt = float("nan")
         self.prepared = {}
+        self.joints = {}
 
     def attempt(self, dt: float) -> Trial:
         """Make a step from the state, which stays where it is. Collective.
@@ -141,6 +147,7 @@ class Stepper:
         while len(self.prepared) >= FACTORS and dt not in self.prepared:
             oldest = next(iter(self.prepared))
             del self.prepared[oldest]
+            self.joints.pop(oldest, None)
         return Trial(self._attempt(float(dt)), float(dt))
 
     def accept(self, trial: Trial) -> State:
@@ -199,14 +206,24 @@ class Stepper:
             with together_if_own(surface.comm, scheme):
                 stage = scheme.press(problem, state, stage, step, dt)
             step = pose(problem, stage, solver.A)
-        certified = solver.solve(step)
+        if problem.joint is None:
+            certified = solver.solve(step)
+        else:
+            step, certified = self.joints[dt].solve(step, pose_joint(problem, state, dt))
+            stage = replace(stage, bound=stage.bound - step.joint.shift)
         answer = complete(stage, step, certified.result)
+        moving = answer
+        if step.joint is not None:
+            answer = joint_steps.release(step, answer)
+            moving = joint_steps.relieve(step, answer)
 
         # Displacements and velocities at its end: of the scheme, then of the impact law.
         with together_if_own(surface.comm, scheme):
             free = scheme.finish(problem, state, stage, answer, dt)
         with together_if_own(surface.comm, problem.impact or scheme):
             new = after_impact(problem, scheme, state, free, dt)
+        if step.joint is not None:
+            new = joint_steps.commit(new, step, certified.result)
         for vector in (free.u, free.v, new.u, new.v):
             freeze(vector)  # states are handed out, and the next step is made of them
         return Report(
@@ -218,7 +235,7 @@ class Stepper:
             result=certified.result,
             certificate=certified.certificate,
             # formed only if some recorder asks for it
-            averages=partial(average, problem, stage, answer, state, free),
+            averages=partial(average, problem, stage, moving, state, free),
             escalated=certified.escalated,
         )
 
@@ -234,9 +251,10 @@ class Stepper:
             equations = method.problem.equations
             kind = CertifiedSolver if equations.internal is None else NonlinearSolver
             A = make_matrix(equations, stage)
-            self.prepared[dt] = kind(
-                method.problem, A, stage.scale, method.solvers, method.tolerance
-            )
+            solver = kind(method.problem, A, stage.scale, method.solvers, method.tolerance)
+            self.prepared[dt] = solver
+            if isinstance(solver, CertifiedSolver) and method.problem.joint is not None:
+                self.joints[dt] = JointSolver(solver.solve, solver.first, method.tolerance)
         return self.prepared[dt]
 
 

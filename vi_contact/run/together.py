@@ -99,7 +99,7 @@ def group_runs(runs: Sequence[Together]) -> None:
         plan = run.step_plan
         alone = problem.surface.comm.size > 1 or plan.halvings or run.base >= plan.steps
         beside = problem.system.companions or problem.surface.companions
-        curved = problem.system.internal is not None
+        curved = problem.system.internal is not None or problem.joint is not None
         if alone or beside or curved or not getattr(run.method.scheme, "by_rows", False):
             continue
         for group in groups:

@@ -38,6 +38,7 @@ class SS22(SingleStep):
     """
 
     by_rows: ClassVar[bool] = True
+    takes_joints: ClassVar[bool] = True
 
     theta1: float = 0.5
     theta2: float = 0.5

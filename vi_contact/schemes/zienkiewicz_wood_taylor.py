@@ -35,6 +35,7 @@ class ZienkiewiczWoodTaylor(SingleStep):
     """
 
     by_rows: ClassVar[bool] = True
+    takes_joints: ClassVar[bool] = True
 
     phi: Annotated[
         float, Between(0.5, 1.0, remedy="give a weight from 0.5 to 1, less is unstable")

@@ -125,6 +125,15 @@ class PreparedAutomatic:
         solve_many = getattr(self._choose(many), "solve_many", None)
         return None if solve_many is None else solve_many(many, own)
 
+    def make_passes(self, step: StepProblem) -> Any:
+        """Return what makes the passes of steps with a joint; None where the route has none.
+
+        Args:
+            step: any step.
+        """
+        make_passes = getattr(self._choose(step), "make_passes", None)
+        return None if make_passes is None else make_passes(step)
+
     def _choose(self, step: StepProblem) -> PreparedSolver:
         """Return the prepared solver, chosen by the first step. Collective."""
         if self._prepared is None:

@@ -33,6 +33,7 @@ from ..core.surfaces import ContactSurface
 from ..core.timing import report_time
 from ..kernels.condensation import Condensation, CondensedLast, condense
 from .certified import check_laws
+from .condensed_passes import CondensedPasses
 from .friction.condensed import CondensedFriction
 from .friction.newton import FrictionNewton
 from .friction.problem import FrictionMethod, check_inner_method
@@ -147,6 +148,7 @@ class PreparedCondensed:
         self._rigid = surface.everywhere(surface.rigid)
         self._name = f"condensed {type(settings.method).__name__}" if surface.total else "linear"
         self._normal: NormalProblem | None = None
+        self._passes: CondensedPasses | None = None
         if surface.tangents.shape[1] == 0:
             self._condense_normal()  # in one dimension no step has friction
 
@@ -216,6 +218,56 @@ class PreparedCondensed:
             iterations=answer.iterations,
             method=self._name,
         )
+
+    def make_passes(self, step: StepProblem) -> CondensedPasses:
+        """Return what makes the passes of steps with a joint. Collective when first asked.
+
+        Args:
+            step: any step of this A, which tells of friction.
+        """
+        if self._passes is None:
+            self._passes = self._prepare_passes(frictional=step.slip0 is not None)
+        return self._passes
+
+    def _prepare_passes(self, *, frictional: bool) -> CondensedPasses:
+        """Return passes on normal unknowns or, with friction, on normal and tangential ones."""
+        surface = self._surface
+        springs = surface.everywhere(surface.compliance) / self._scale
+        if frictional and surface.total:
+            friction = self.friction
+            compliance = np.zeros(len(friction.delassus))
+            compliance[:: len(compliance) // surface.total] = springs
+
+            def rub(step: StepProblem, free: Array, near: Array | None) -> Any:
+                """Solve the small problem with friction."""
+                answer, held, values = friction.reactions(step, free, self._rigid, near)
+                q = values.reshape(answer.r.shape) - free.reshape(answer.r.shape)
+                moved = q + (friction.delassus @ answer.r.ravel()).reshape(q.shape)
+                found = (answer.r, moved, answer.active, answer.stick, held, values)
+                return (*found, answer.iterations)
+
+            return CondensedPasses(
+                friction.condensed,
+                rub,
+                friction.delassus,
+                compliance,
+                surface,
+                f"condensed {type(self._settings.friction_method).__name__}",
+            )
+        condensed, small = self._condense_normal()
+        G = condensed.flexibility
+
+        def press(step: StepProblem, free: Array, near: Array | None) -> Any:
+            """Solve the small problem without friction."""
+            bound = surface.everywhere(step.bound)
+            guess = surface.everywhere(step.active) if near is None else near[:, 0] > 0.0
+            answer: LCPResult = small.solve(bound - free, guess)
+            moved = (bound - free + G @ answer.r)[:, None]
+            held = (answer.r != 0.0) & self._rigid
+            closed = answer.active
+            return answer.r[:, None], moved, closed, closed, held, bound, answer.iterations
+
+        return CondensedPasses(condensed, press, G, springs, surface, self._name)
 
     def solve_many(self, many: StepProblem, own: Callable[[int], StepProblem]) -> Answers | None:
         """Return the answers to several steps of this A, which reads its factor once for all.

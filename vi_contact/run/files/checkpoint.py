@@ -8,6 +8,7 @@ They hold the state of a run in numbers that do not depend on the ranks that go 
   ``space.ids`` (the rotated basis has the same numbers as the system's own);
 - ``r_n``, ``active`` and with friction ``r_t``, a row for each condition of all ranks, in the order
   of ``surface.slots``;
+- arrays of a joint in the memory (``memory_joint_…``), likewise;
 - other arrays of the memory, which are the same on every rank;
 - ``about``, a text in JSON: t, k, the base steps done, what problem it is of (``identify``), the
   checksum of the histories, and the number of the format;
@@ -39,6 +40,7 @@ from ...core.algebra import largest
 from ...core.checks import array, number, quote, whole
 from ...core.errors import InputError, is_of_machine
 from ...core.files import on_root, write_atomically
+from ...core.joints import MEMORY as JOINT
 from ...core.own_files import is_own, open_to_read
 from ...core.problem import ContactProblem
 from ...core.step import Scheme, State
@@ -186,6 +188,9 @@ def _split(problem: ContactProblem, state: State) -> tuple[Arrays, Arrays]:
     for name in sorted(state.memory):
         values = np.asarray(state.memory[name])
         # On one rank alone an array may have as many entries as there are unknowns by chance.
+        if name.startswith(JOINT):
+            whole[f"{MEMORY}{name}"] = problem.surface.on_first(values)
+            continue
         is_whole = largest(comm, values.shape != state.u.shape)
         kind = whole if is_whole else vectors
         kind[f"{MEMORY}{name}"] = values
@@ -223,7 +228,8 @@ def read_checkpoint(
     # What a scheme keeps in mind was made of the matrices and loads of its own problem.
     memory = {}
     for name, values in arrays.items():
-        if name.startswith(MEMORY) and not changes:
+        of_joint = name.startswith(MEMORY + JOINT)
+        if name.startswith(MEMORY) and (of_joint or not changes):
             memory[name.removeprefix(MEMORY)] = values
     state = State(
         about["t"],
@@ -245,8 +251,8 @@ def _send_rows(problem: ContactProblem, vectors: list[str], whole: Arrays | None
     Args:
         problem: whose unknowns and conditions the ranks have.
         vectors: names of arrays with a row for each unknown.
-        whole: all arrays, on rank 0 only; those of CONTACT have a row for each condition, and each
-            rank gets the others as they are.
+        whole: all arrays, on rank 0 only; those of CONTACT and of joints have a row for each
+            condition, and each rank gets the others as they are.
     """
     comm = problem.system.algebra.comm
     parts = comm.gather((problem.system.space.ids, problem.surface.slots)) or [((), ())] * comm.size
@@ -256,6 +262,8 @@ def _send_rows(problem: ContactProblem, vectors: list[str], whole: Arrays | None
         # Which rows this rank has of each array; ... takes all of those that ranks have alike.
         rows = dict.fromkeys(vectors, np.searchsorted(all_ids, ids))
         rows |= dict.fromkeys(CONTACT, slots)
+        of_joints = [name for name in whole or {} if name.startswith(MEMORY + JOINT)]
+        rows |= dict.fromkeys(of_joints, slots)
         message = {name: values[rows.get(name, ...)] for name, values in (whole or {}).items()}
         message = comm.bcast(message)
         if rank == comm.rank:
@@ -407,6 +415,8 @@ def _check_sizes(problem: ContactProblem, about: dict[str, Any], arrays: Arrays)
     shapes = dict.fromkeys(about["vectors"], (n,)) | {"r_n": (m,), "active": (m,)}
     for name, values in arrays.items():
         shape = shapes.pop(name, values.shape)
+        if name.startswith(MEMORY + JOINT):
+            shape = (m, *values.shape[1:])
         if name == "r_t":
             shape = (m, problem.surface.tangents.shape[1])
         kind = np.dtype(bool if name == "active" else float)

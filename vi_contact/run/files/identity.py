@@ -73,6 +73,7 @@ def identify(
     places = np.arange(SAMPLES)
     times = start + (end - start) * (places + probe(places, 0) + 0.5) / SAMPLES
     friction = replace_tuples(problem.friction, surface, partial(_gather_values, surface))
+    joint = replace_tuples(problem.joint, surface, partial(_gather_values, surface))
     return {
         "unknowns": system.space.unknowns,
         "contact points": surface.total,
@@ -81,6 +82,7 @@ def identify(
         "mass": write_as_text(problem.mass),
         "impact law": write_as_text(problem.impact),
         "friction law": write_as_text(friction),
+        **({} if joint is None else {"joint": write_as_text(joint)}),
         "stiffness": [_multiply(system, w, system.K @ x) for w, x in pairs],
         "internal force": _describe_internal(system, probes[0]),
         "mass matrix": [_multiply(system, w, system.M @ x) for w, x in pairs],

@@ -1,6 +1,7 @@
 from .body_motion import BodyMotion as BodyMotion
 from .contact import Contact as Contact
 from .energy import Energy as Energy
+from .joint_energy import JointEnergy as JointEnergy
 from .largest_strain import LargestStrain as LargestStrain
 from .probe import Probe as Probe
 from .racking import Racking as Racking

@@ -9,6 +9,7 @@ import numpy as np
 from ...core.algebra import Array, Mask, total
 from ...core.arguments import check_fields
 from ...core.corners import find_tangents
+from ...core.joints import find_limit
 from ...core.problem import ContactProblem
 from ...core.step import AXES, Columns, Report, Row, State, find_slipping
 from ...core.surfaces import ContactSurface
@@ -245,7 +246,7 @@ class Contact:
             state: whose reactions count.
             slipping: (m,) which points slipped, or None.
         """
-        limit = self._problem.friction.limit(state.r_n, self._problem.surface.weights, 1.0)
+        limit = find_limit(self._problem, state)
         used = 0.0 if state.r_t is None else float(np.linalg.norm(state.r_t, axis=1).sum())
         slid = 0 if slipping is None else np.count_nonzero(slipping & state.active)
         return [used, float(np.sum(limit)), float(slid)]

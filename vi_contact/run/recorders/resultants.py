@@ -9,6 +9,7 @@ import numpy as np
 from ...core.algebra import Mask, from_each, largest
 from ...core.checks import array, column_name, optional, provides
 from ...core.errors import InputError
+from ...core.joints import find_limit
 from ...core.problem import ContactProblem
 from ...core.quantities import Unit
 from ...core.step import AXES, Columns, Report, Row, State
@@ -216,7 +217,7 @@ class Resultants:
         motion = u_n[part.mask] @ part.fit
         ends = r_n[part.mask] @ part.ends
         slid = np.einsum("k,kdc,kc->d", part.weights, part.tangents, slip[part.mask]) / part.whole
-        limit = self._problem.friction.limit(r_n, surface.weights, 1.0)[part.mask].sum()
+        limit = find_limit(self._problem, state)[part.mask].sum()
         own = [forces, motion, ends, slid, [limit]]
         everywhere = surface.comm.sum(np.concatenate(own))
         borders = np.cumsum([len(values) for values in own[:-1]])

@@ -98,7 +98,7 @@ class CondensedFriction:
         )
 
     def reactions(
-        self, step: StepProblem, free: Array, rigid: Mask
+        self, step: StepProblem, free: Array, rigid: Mask, near: Array | None = None
     ) -> tuple[FrictionResult, Mask, Array]:
         """Return the reactions of a step, and where contact unknowns are put. Collective.
 
@@ -109,6 +109,7 @@ class CondensedFriction:
             step: the step.
             free: (m d,) contact unknowns without reactions.
             rigid: (m,) which supports are.
+            near: reactions (m, d) of a step like it, to begin with; None: the contact set.
 
         Returns:
             The answer to the small problem; which contact unknowns (m d,) are held, and on what
@@ -131,7 +132,7 @@ class CondensedFriction:
 
         def solve(mu: Array, before: FrictionResult | None) -> FrictionResult:
             """Solve the small problem of all conditions with coefficients mu."""
-            guess = active if before is None else before.r
+            guess = (active if near is None else near) if before is None else before.r
             return self._small.solve(q, cohesion, mu, guess)
 
         def slip_of(answer: FrictionResult) -> Array:

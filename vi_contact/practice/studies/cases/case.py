@@ -44,8 +44,9 @@ from ....meshes.gmsh_session import MeshScript
 from ....run.cross_check import CrossChecked
 from ....run.files.folder import lock_folder, refuse_files_of_others, run_folder
 from ....run.files.writer import FieldWriter
+from ....run.joint_uniqueness import joint_uniqueness
 from ....run.method import with_defaults
-from ....run.recorders import Contact, Energy
+from ....run.recorders import Contact, Energy, JointEnergy
 from ....run.recorders.steps import Steps
 from ....run.simulate import Solution, rehearse, simulate
 from ....run.time_steps import StepPlan, plan_steps
@@ -63,6 +64,7 @@ from .bodies import (
 )
 from .expressions import check_axes
 from .friction_of_tables import join_laws, list_laws
+from .joints_of_tables import join_joints
 from .library import check_format, find_base_folder, keep_copy, refuse_case_of_others
 from .old_keys import renew_keys
 from .own_classes import check_packages
@@ -219,7 +221,8 @@ class Case:
         problem = self._build_problem(parts)
         recorders = self._build_recorders(parts)
         if recorders is None:
-            recorders = (Energy(), Contact())
+            of_joint = () if problem.joint is None else (JointEnergy(),)
+            recorders = (Energy(), Contact(), *of_joint)
         problem, _ = with_defaults(problem, self._build_scheme())
         state = initial_state(problem)
         return frozenset(
@@ -418,6 +421,15 @@ class Case:
             "solver": ", then ".join(map(repr, solvers)),
         }
 
+    def compute_lambda(self, problem: ContactProblem, dt: float) -> float:
+        """Return lambda of the joint of a problem of the case (``run.joint_uniqueness``).
+
+        Args:
+            problem: with a joint.
+            dt: length of its steps [s].
+        """
+        return joint_uniqueness(problem, dt, scheme=self._build_scheme())
+
     def _build_table(self, table: str, **context: Any) -> Any:
         """Return what a table makes; None where there is none."""
         return build(self.nodes[table], context) if table in self.nodes else None
@@ -548,15 +560,16 @@ class Case:
 
     def _build_problem(self, parts: Parts) -> ContactProblem:
         """Return the contact problem of these parts, with its laws and excitations."""
+        contacts = list_calls(self.nodes.get("contact", ()))
+        friction = self._build_friction()
+        joint = join_joints(friction, contacts, parts.surface, parts.tables)
+        if joint is None:
+            friction = join_laws(friction, contacts, parts.surface, parts.tables)
         return ContactProblem(
             parts.system,
             parts.surface,
-            friction=join_laws(
-                self._build_friction(),
-                list_calls(self.nodes.get("contact", ())),
-                parts.surface,
-                parts.tables,
-            ),
+            friction=friction if joint is None else Frictionless(),
+            joint=joint,
             impact=self._build_table("impact"),
             mass=self._build_table("mass") or parts.mass,
             excitation=() if parts.moved else self.excitations(system=parts.system),

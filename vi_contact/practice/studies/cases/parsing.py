@@ -15,7 +15,7 @@ from ....core.checks import SHOWN, quote
 from ....core.errors import InputError
 from ....core.renamed import WORDS
 from .own_classes import find_own_class
-from .quantities import FIELD, HISTORY, Expression, read_field, read_quantity
+from .quantities import FIELD, HISTORY, OF_POINTS, Expression, read_field, read_quantity
 from .table_calls import GROUP, Call, Callee, Group, Node, Spot, make_callee
 
 log = logging.getLogger(__name__)
@@ -302,7 +302,7 @@ def _describe(member: Any, members: Sequence[Any], words: Words) -> list[str]:
         return [_describe_list(member, words)]
     if get_origin(member) in (Mapping, dict):
         return ["a table of names"]
-    if member in (FIELD, HISTORY, Expression):
+    if member in (FIELD, HISTORY, OF_POINTS, Expression):
         return [_describe_expression(member, members)]
     return []
 

@@ -21,6 +21,7 @@ from .table_calls import Spot
 # Types of functions for which expressions may stand.
 FIELD = Callable[[Array, float], Array]  # of points and the time
 AT_START = Callable[[Array], Array]  # of points
+OF_POINTS = Callable[[Array], Any]  # of points, one value each
 HISTORY = Callable[[float], float]  # of the time
 _NUMBER = r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _VALUE = re.compile(rf"(?<![\w.\s])\s*((?>{_NUMBER}))\s*((?:1\s*/\s*)?{NAME}[^()+]*)")
@@ -60,7 +61,7 @@ def read_quantity(text: str, members: Sequence[Any], spot: Spot) -> Any:
                 f"is {quote(text)}, which is {value:g}: give a finite number, a whole one of things"
             )
         return value if float in members else int(value)
-    return Places(expression) if kind == FIELD else expression
+    return Places(expression) if kind in (FIELD, OF_POINTS) else expression
 
 
 def _select_function(members: Sequence[Any]) -> tuple[Any, str]:
@@ -72,7 +73,7 @@ def _select_function(members: Sequence[Any]) -> tuple[Any, str]:
     takes_lists = any(get_origin(member) in (tuple, list, Sequence) for member in members)
     if takes_lists and float not in members:
         return None, ""
-    for kind, letters in ((FIELD, "xyzt"), (Expression, "xyz"), (HISTORY, "t")):
+    for kind, letters in ((FIELD, "xyzt"), (OF_POINTS, "xyz"), (Expression, "xyz"), (HISTORY, "t")):
         if kind in members:
             return kind, letters
     return None, ""

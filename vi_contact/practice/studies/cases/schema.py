@@ -18,7 +18,7 @@ from .bodies import BODY_TABLES
 from .case import TABLES
 from .own_classes import is_protocol
 from .parsing import Words, find_choices, is_list, is_path
-from .quantities import AT_START, FIELD, HISTORY, Expression
+from .quantities import AT_START, FIELD, HISTORY, OF_POINTS, Expression
 from .stage_tables import BY_KEY, WHOLE
 from .table_calls import Callee
 from .vocabulary import make_words
@@ -34,6 +34,7 @@ _PLAIN: Mapping[Any, Any] = {
     Expression: {"type": "string"},
     FIELD: {"type": ["string", "array"]},
     AT_START: {"type": "array"},
+    OF_POINTS: {"type": "string"},
 }
 _OWN_CLASS = {
     "type": "object",

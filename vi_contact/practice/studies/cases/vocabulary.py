@@ -27,6 +27,7 @@ from ....core import (
 )
 from ....core.arguments import check_arguments
 from ....core.corners import FEATURE_ANGLE
+from ....core.joint_laws import JointLaw
 from ....core.quantities import RATIO, NotNegative, Positive, Unit
 from ....core.system import SemiDiscreteSystem
 from ....core.units import STANDARD_GRAVITY
@@ -78,6 +79,7 @@ _KINDS: Mapping[ModuleType, tuple[Any, ...]] = {  # room -> the kinds of things 
         VelocityUpdate,
         MassLaw,
         Excitation,
+        JointLaw,
     ),
     ground_motion: (Excitation,),
     meshes: (MeshScript,),
@@ -144,6 +146,7 @@ def surface(
     frictionless_corners: bool = False,
     hinges: bool = False,
     mu: FrictionCoefficient | None = None,
+    joint: JointLaw | None = None,
     name: str = "",
 ) -> ContactSurface:
     """Make a ``contact_surface``.
@@ -159,6 +162,7 @@ def surface(
         frictionless_corners: whether nodes with several conditions slide freely over their faces.
         hinges: whether the body may hang together with another one by nodes of this boundary.
         mu: coefficient of friction of this surface; None: that of [friction].
+        joint: law of a joint whose strength changes, in the place of mu and [friction]; None: none.
         name: of the surface, as ``part`` of recorders.
     """
     result = fem.contact_surface(
@@ -184,6 +188,7 @@ def pair(
     frictionless_corners: bool = False,
     hinges: bool = False,
     mu: FrictionCoefficient | None = None,
+    joint: JointLaw | None = None,
     name: str = "",
 ) -> ContactSurface:
     """Make a ``contact_pair``; roller: ``.bilateral_everywhere()``; the others: as of ``surface``.
@@ -199,6 +204,7 @@ def pair(
         frictionless_corners: as of ``surface``.
         hinges: as of ``surface``.
         mu: as of ``surface``.
+        joint: as of ``surface``.
         name: as of ``surface``.
     """
     result = fem.contact_pair(
@@ -503,6 +509,7 @@ _PLACES: tuple[tuple[Any, str], ...] = (
     (Prescribed, "[[system.prescribed]]"),
     (Dashpots, "[[system.dashpots]]"),
     (Matching, "matching"),
+    (JointLaw, "joint"),
     (Obstacle, "obstacle"),
     (SmallMethod, "method"),
     (FrictionMethod, "method"),
@@ -625,6 +632,7 @@ def make_words(folder: Path, allowed: Sequence[str] = ()) -> Words:
         Dashpots: "Dashpots",
         FieldWriter: "XDMF",
         LayerLaw: "contact_layer",
+        JointLaw: "Joint",
         DesignSpectrum: design_spectra.DEFAULT,
     }
     return Words(

@@ -14,7 +14,7 @@ from .....fem.mesh.tagged_mesh import Facets
 from .....fem.output.outline import facets_with_cells
 from ..bodies import Body
 from ..friction_of_tables import count_points, find_mu
-from ..table_calls import Group, walk_nodes
+from ..table_calls import Group, build, walk_nodes
 
 _CAPITAL = re.compile(r"(?<=[a-z])(?=[A-Z])")  # between the words of a name such as CompliantBase
 
@@ -70,14 +70,16 @@ def describe_contact(
         groups = [inner.name for inner in walk_nodes(node) if isinstance(inner, Group)]
         known = joints[number] == 1 and len(surface.censuses) == firsts[-1]
         census = surface.censuses[firsts[number]] if known else None
+        joint = node.arguments.get("joint")
+        law = laws[number] if joint is None else build(joint, {})
         yield {
             "name": node.arguments.get("name") or " on ".join(groups) or "all joints",
             "points": int(b - a),
             "size": float(whole.weights[a:b].sum()),
             "gaps": _find_gaps(whole.gap0[a:b]),
             "held": bool(node.arguments.get("roller", False)),
-            "friction": repr(laws[number]),
-            "mu": find_mu(laws[number]),
+            "friction": repr(law),
+            "mu": find_mu(law),
             "nodes": "" if census is None else census.in_words(),
             "places": whole.points[a:b],
             "others": {} if census is None else census.places,

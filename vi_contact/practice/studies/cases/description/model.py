@@ -4,6 +4,7 @@ This is what ``run --check`` tells and model.json holds.
 """
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -83,6 +84,7 @@ def describe(
     model |= _describe_actions(case, problem, tags, run["t_end"])
     model |= _describe_motions(case, parts)
     model |= _describe_modes(case, problem, most)
+    model |= _describe_joint(problem, case, run["dt"], most)
     model["sides"] = describe_sides(model)
     model["constant_loads"] = sum_up(model)
     _add_findings(model, case, problem, plan)
@@ -153,6 +155,12 @@ def _add_findings(
     """Add to a model its defects, and what an engineer should look at; collective."""
     model["defects"] = list(find_defects(model))
     model["warnings"] = [*find_warnings(model), *find_left_over(case.path, case.tables)]
+    size = model.get("joint", {}).get("lambda")
+    if size is not None and size >= 1.0:
+        model["warnings"].append(
+            f"lambda of the joint is {size:.3g}: it may snap back inside a step, which then has "
+            "several answers; take a smaller dt or, without mass at the contact, smaller elements"
+        )
     for sentence, refused in judge_loose_bodies(problem) if problem.system.floating else ():
         model["defects" if refused else "warnings"].append(sentence)
 
@@ -162,6 +170,24 @@ def _add_findings(
         warning = sampling_warning(problem, max(step for step, _ in plan.parts))
         if warning:
             model["warnings"].append(warning)
+
+
+def _describe_joint(problem: ContactProblem, case: Any, dt: float, most: int) -> dict[str, Any]:
+    """Return the law of a joint and lambda of its steps, nothing without one; collective.
+
+    Args:
+        problem: of the case.
+        case: a ``Case``.
+        dt: length of its steps [s].
+        most: unknowns beyond which lambda is left out.
+    """
+    if problem.joint is None:
+        return {}
+    size = None
+    if problem.system.space.unknowns <= most:
+        size = case.compute_lambda(problem, dt)
+    is_finite = size is not None and math.isfinite(size)
+    return {"joint": {"law": repr(problem.joint), "lambda": size if is_finite else None}}
 
 
 def _describe_modes(case: Any, problem: ContactProblem, most: int) -> dict[str, Any]:

@@ -81,6 +81,12 @@ def list_steps(model: Model, pen: Pen) -> Iterator[Row]:
         is_plain = name == "solver" or str(text).endswith("()")
         remark = "" if is_plain else _shorten_numbers(str(text))
         yield say(name, ", then ".join(kinds), remark)
+    joint = model.get("joint") or {}
+    if joint:
+        yield say("joint", str(joint["law"]).partition("(")[0], _shorten_numbers(joint["law"]))
+        if joint["lambda"] is not None:
+            remark = "below 1 every step has one answer; above, a joint may snap back inside it"
+            yield say("joint: lambda of a step", write_number(joint["lambda"]), remark)
     for wave in list_objects(model, "waves"):
         if "c_s" not in wave:
             continue

@@ -1,0 +1,302 @@
+"""Bind two faces by a tensile strength and a cohesion that are lost as the joint opens and slips.
+
+With the largest opening kappa and the critical one dc,
+
+    f(kappa) = f_t D(kappa),    D = 1 - kappa/dc (linear),  1 below dc (constant),  0 (brittle)
+
+is the traction of a joint that opens, and G_f = f_t dc/2 [J/m²] what its loss takes (linear; f_t dc
+constant, 0 brittle). Below its largest opening it goes to the origin, f(kappa) g/kappa, and gives
+that energy back. The cohesion c D is lost with it: in mixed mode kappa is the largest
+sqrt(g² + (beta s)²) with beta = c/f_t, so that both modes take G_f. Friction mu r_n stays.
+
+Over a step the strength is the mean of the law, its work over the change of opening: the sum of the
+works is then the area under the law whatever dt is. Sources: A. Hillerborg, M. Modéer and
+P.-E. Petersson, Cem. Concr. Res. 6 (1976) 773-782 (linear); D. S. Dugdale, J. Mech. Phys. Solids 8
+(1960) 100-104 (constant).
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+import numpy as np
+
+from ..core.algebra import Array
+from ..core.errors import InputError
+from ..core.joint_laws import Committed, Slope, Strength
+from ..core.quantities import RATIO, Unit
+from .joint_values import (
+    NotNegativeByPoint,
+    OfPoints,
+    PositiveByPoint,
+    Prestress,
+    compare_fields,
+    measure_length,
+)
+
+SHORT = 1e-6  # of dc: over a shorter way the slope of the mean is half that of the law
+ROUNDING = 1e-9  # relative: a cohesion that is mu times the tensile strength but for rounding
+
+
+@dataclass(frozen=True)
+class Joint(OfPoints):
+    """Bind by the equations of the module; every number may be one per point, or f(points).
+
+    Attributes:
+        mu: coefficient of friction.
+        cohesion: c [Pa]; at least mu times the tension.
+        tension: tensile strength f_t [Pa].
+        energy: G_f [J/m²]; give it or the opening.
+        opening: dc [m], at which nothing is left; of a joint without tension, the slip.
+        softening: "linear", "brittle" or "constant".
+        dilatancy: tan(psi), by how much slip lifts the joint.
+        prestress: stresses before anything moves; None for none.
+        implicit: False takes the strength that is there before each step.
+    """
+
+    mu: Annotated[NotNegativeByPoint, RATIO, "the friction coefficient mu"] = 0.0
+    cohesion: Annotated[NotNegativeByPoint, Unit("Pa"), "the cohesion"] = 0.0
+    tension: Annotated[NotNegativeByPoint, Unit("Pa"), "the tension"] = 0.0
+    energy: Annotated[PositiveByPoint | None, Unit("J/m²"), "the fracture energy"] = None
+    opening: Annotated[PositiveByPoint | None, Unit("m"), "the opening"] = None
+    softening: Literal["linear", "brittle", "constant"] = "linear"
+    dilatancy: Annotated[NotNegativeByPoint, RATIO, "the dilatancy tan(psi)"] = 0.0
+    prestress: Prestress | None = None
+    implicit: bool = True
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.refuse_word("softening", ("linear", "brittle", "constant"))
+        self._refuse_softening()
+        self.refuse_where(
+            compare_fields(
+                lambda mu, tension, cohesion: cohesion < mu * tension * (1.0 - ROUNDING),
+                self.mu,
+                self.tension,
+                self.cohesion,
+            ),
+            "cohesion is less than mu times tension, so that a pulled point would have a negative "
+            "limit of friction: give cohesion >= mu tension",
+        )
+
+    def _refuse_softening(self) -> None:
+        """Raise InputError unless energy and opening say how the strength is lost."""
+        given = [name for name in ("energy", "opening") if getattr(self, name) is not None]
+        if self.softening == "brittle":
+            if given:
+                raise InputError(
+                    f"Joint: {given[0]} is given beside softening='brittle', which loses all when "
+                    "it opens: leave one of the two out"
+                )
+            return
+        strengths: tuple[Any, ...] = (self.tension, self.cohesion)
+        if any(callable(value) or bool(np.any(value)) for value in strengths) and len(given) != 1:
+            raise InputError(
+                "Joint: give either energy or opening, over which tension and cohesion are lost, "
+                "or softening='brittle'"
+            )
+
+    @property
+    def rubs(self) -> bool:
+        """Say whether there is any tangential strength, the same on all ranks."""
+        return not (_is_zero(self.mu) and _is_zero(self.cohesion))
+
+    def _find_reach(self, count: int) -> Array:
+        """Return dc (count,) [m]; 0 for a brittle joint."""
+        return self.make_once("dc", count, lambda: self._make_reach(count))
+
+    def _make_reach(self, count: int) -> Array:
+        """Return dc (count,) [m], out of the energy where it is given."""
+        if self.softening == "brittle":
+            return np.zeros(count)
+        if self.opening is not None:
+            return self.spread("opening", count).copy()
+        if self.energy is None:
+            return np.ones(count)  # of a joint without strength: nothing is lost
+        tension = self.spread("tension", count)
+        strength = np.where(tension > 0.0, tension, self.spread("cohesion", count))
+        area = 0.5 if self.softening == "linear" else 1.0
+        energy = self.spread("energy", count)
+        reach = np.ones(count)
+        return np.divide(energy, area * strength, out=reach, where=strength > 0.0)
+
+    def _find_beta(self, count: int) -> Array:
+        """Return c/f_t (count,), by which slip counts as opening; 1 without tension."""
+        return self.make_once("beta", count, lambda: self._make_beta(count))
+
+    def _make_beta(self, count: int) -> Array:
+        """Return c/f_t (count,)."""
+        tension = self.spread("tension", count)
+        cohesion = self.spread("cohesion", count)
+        return np.divide(cohesion, tension, out=np.ones(count), where=tension > 0.0)
+
+    def start(self, count: int) -> Committed:
+        """Return "kappa" and "opened" (count,) [m], and "way" [m], all zero.
+
+        Args:
+            count: number of points.
+        """
+        zero = np.zeros(count)
+        return {"kappa": zero, "opened": zero, "way": zero}
+
+    def _left(self, kappa: Array, dc: Array) -> Array:
+        """Return D (m,)."""
+        if self.softening == "brittle":
+            return np.where(kappa > 0.0, 0.0, 1.0)
+        if self.softening == "constant":
+            return np.where(kappa < dc, 1.0, 0.0)
+        return 1.0 - np.minimum(kappa / dc, 1.0)
+
+    def _mean_left(self, first: Array, last: Array, dc: Array) -> Array:
+        """Return the mean of D between two kappa (m,) [m], first <= last."""
+        if self.softening == "brittle":
+            return self._left(last, dc)
+        a = np.minimum(first, dc)
+        b = np.minimum(last, dc)
+        way = last - first
+        # Beyond dc nothing is left, and between them the mean is that of the part below.
+        part = np.divide(b - a, way, out=np.ones(len(a)), where=way > 0.0)
+        if self.softening == "linear":
+            return (1.0 - 0.5 * (a + b) / dc) * part
+        return np.where(way > 0.0, part, self._left(first, dc))
+
+    def _walk(
+        self, committed: Committed, g1: Array, s1: Array
+    ) -> tuple[Array, Array, Array, Array]:
+        """Return dc, kappa at the largest opening before and at the end, and D/opened on the way.
+
+        Args:
+            committed: before the step.
+            g1: openings (m,) [m] at its end.
+            s1: slips (m, d - 1) [m] at its end.
+        """
+        count = len(g1)
+        dc = self._find_reach(count)
+        slip = self._find_beta(count) * measure_length(s1)
+        kappa = committed["kappa"]
+        opened = committed["opened"]
+        turn = np.maximum(kappa, np.hypot(np.minimum(g1, opened), slip))
+        last = np.maximum(turn, np.hypot(g1, slip))
+        mean = self._mean_left(kappa, turn, dc)
+        secant = np.divide(mean, opened, out=np.zeros(count), where=opened > 0.0)
+        return dc, turn, last, secant
+
+    def strength(
+        self, committed: Committed, g0: Array, g1: Array, s0: Array, s1: Array, dt: float
+    ) -> Strength:
+        """Return the mean strength [Pa] of a step, work over the change of opening.
+
+        Args:
+            committed: before the step.
+            g0: openings (m,) [m] at its beginning.
+            g1: openings at its end.
+            s0: slips (m, d - 1) [m] at its beginning.
+            s1: slips at its end.
+            dt: its length [s]; not read.
+        """
+        count = len(g1)
+        dc, turn, last, secant = self._walk(committed, g1, s1)
+        opened = committed["opened"]
+
+        # Along the secant up to the largest opening before, then along the law.
+        on_law = self._mean_left(turn, last, dc)
+        beyond = g1 > opened
+        back = 0.5 * secant * (opened - g0) * (opened + g0)
+        way = g1 - g0
+        mean = np.divide(
+            back + on_law * (g1 - opened), way, out=on_law.copy(), where=beyond & (way > 0.0)
+        )
+        mean = np.where(beyond & (g0 == opened), on_law, mean)
+        mean = np.where(beyond | (opened == 0.0), mean, 0.5 * secant * (g0 + g1))
+
+        tension = self.spread("tension", count) * mean
+        cohesion = self.spread("cohesion", count)
+        if not _is_zero(self.cohesion):
+            cohesion = cohesion * self._mean_left(committed["kappa"], last, dc)
+        return Strength(tension, cohesion, self.spread("mu", count), np.zeros(count))
+
+    def slope(
+        self, committed: Committed, g0: Array, g1: Array, s0: Array, s1: Array, dt: float
+    ) -> Slope:
+        """Return how the mean tension changes with the end of the step.
+
+        On the secant half of its slope; on the law (f(g1) - mean)/(g1 - g0).
+
+        Args:
+            committed: before the step.
+            g0: openings (m,) [m] at its beginning.
+            g1: openings at its end.
+            s0: slips (m, d - 1) [m] at its beginning.
+            s1: slips at its end.
+            dt: its length [s].
+        """
+        count = len(g1)
+        dc, _, last, secant = self._walk(committed, g1, s1)
+        tension = self.spread("tension", count)
+        mean = self.strength(committed, g0, g1, s0, s1, dt).tension
+        way = g1 - g0
+        is_long = way > SHORT * dc
+        change = tension * self._left(last, dc) - mean
+        of_mean = np.divide(change, way, out=np.zeros(count), where=is_long)
+        if self.softening == "linear":
+            at_once = np.where(last < dc, -0.5 * tension / dc, 0.0)
+            of_mean = np.where(is_long, of_mean, at_once)
+        opened = committed["opened"]
+        on_secant = (g1 < opened) | ((g1 == opened) & (g0 < opened))
+        return Slope(np.where(on_secant, 0.5 * tension * secant, of_mean), np.zeros(count))
+
+    def commit(
+        self, committed: Committed, g0: Array, g1: Array, s0: Array, s1: Array, dt: float
+    ) -> Committed:
+        """Return the largest kappa and opening, and the length of the slip's way, after a step.
+
+        Args:
+            committed: before it.
+            g0: openings (m,) [m] at its beginning.
+            g1: openings at its end.
+            s0: slips (m, d - 1) [m] at its beginning.
+            s1: slips at its end.
+            dt: its length [s]; not read.
+        """
+        _, _, last, _ = self._walk(committed, g1, s1)
+        return {
+            "kappa": last,
+            "opened": np.maximum(committed["opened"], g1),
+            "way": committed["way"] + measure_length(s1 - s0),
+        }
+
+    def stored(self, committed: Committed, g: Array) -> Array:
+        """Return the energy [J/m²] that comes back when the joint closes, ½ f(kappa) g²/opened.
+
+        Args:
+            committed: what the points have gone through.
+            g: openings (m,) [m].
+        """
+        count = len(g)
+        opened = committed["opened"]
+        left = self._left(committed["kappa"], self._find_reach(count))
+        part = np.divide(g, opened, out=np.zeros(count), where=opened > 0.0)
+        return 0.5 * self.spread("tension", count) * left * part * g
+
+    def dilation(self, committed: Committed) -> Array:
+        """Return tan(psi) times the length of the slip's way, (m,) [m]."""
+        way = committed["way"]
+        return self.spread("dilatancy", len(way)) * way
+
+    def softening_of(self, pressure: Array) -> Slope:
+        """Return the steepest losses of strength, as positive numbers; infinite of sudden ones.
+
+        Args:
+            pressure: (m,) [Pa]; not read, as friction stays.
+        """
+        count = len(pressure)
+        tension = self.spread("tension", count)
+        nothing = np.zeros(count)
+        if self.softening != "linear":
+            return Slope(np.where(tension > 0.0, math.inf, 0.0), nothing)
+        return Slope(tension / self._find_reach(count), nothing)
+
+
+def _is_zero(value: object) -> bool:
+    """Say whether a value is the number zero, and no table or function."""
+    return isinstance(value, int | float) and value == 0

@@ -1,0 +1,276 @@
+"""Solve a step with a joint by passes, until the strength used is that of the answer.
+
+A pass is a step of the contract with known strengths F, C, mu and P (``core.joints``). Its answer
+opens the joint by g and slips it by w, and the law has other strengths there. Newton's method
+(``joint_newton``) expects an end of the step, and the law there gives the next strengths. Where a
+pass is no better than the best one, a part of Newton's step is gone.
+
+Where Newton's matrix is not positive, the joint loses more than the bodies give way: the step has
+several answers (*snap-back*). The next pass then takes the strengths of the answer as they are,
+which goes on from the strength before the step, and the log says so.
+
+With ``Condensed`` all passes are on the contact unknowns (``condensed_passes``), and a step costs
+one forward and one backward substitution as without a joint. Other solvers make whole steps, which
+are accelerated (``acceleration``).
+"""
+
+import logging
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..core.algebra import Array, max_abs
+from ..core.errors import StepFailure
+from ..core.joints import JointStep, Strength, compare, judge_strength
+from ..core.step import StepProblem
+from ..core.verify import kkt_residual
+from .acceleration import Anderson
+from .certified import Certified
+from .condensed_passes import CondensedPasses, PassEnd
+from .joint_newton import correct
+from .joint_rates import RatePasses
+
+log = logging.getLogger(__name__)
+
+MOST = 100  # passes of a step
+AIM = 0.1  # of the tolerance: what passes on the contact unknowns come to
+ADVICE = "try a smaller dt, or a joint that loses its strength over a longer way"
+
+
+class JointSolver:
+    """Solve steps with a joint, of one effective matrix.
+
+    Attributes:
+        passes: how many each step took.
+        snapped: steps with a snap-back inside.
+    """
+
+    def __init__(
+        self,
+        solve: Callable[[StepProblem], Certified],
+        prepared: Any,
+        tolerance: float,
+        *,
+        advice: str = ADVICE,
+    ) -> None:
+        """Note what solves the steps.
+
+        Args:
+            solve: returns the certified answer of a step.
+            prepared: the prepared solver, whose ``make_passes`` is used; None for none.
+            tolerance: the largest residual of a certificate.
+            advice: end of the sentence that refuses a step.
+        """
+        self._solve = solve
+        self._make_passes = getattr(prepared, "make_passes", None)
+        self._tolerance = tolerance
+        self._advice = advice
+        self.passes: list[int] = []
+        self.snapped = 0
+        self._rates: RatePasses | None = None
+
+    def solve(self, base: StepProblem, joint: JointStep) -> tuple[StepProblem, Certified]:
+        """Return the step for r' with its strength, and its certified answer. Collective.
+
+        Args:
+            base: the step without its joint.
+            joint: at the beginning of the step.
+
+        Raises:
+            StepFailure: no pass has the strength of its answer, or a step has no answer.
+        """
+        used = joint.guess(base)
+        if not joint.implicit:
+            self.passes.append(1)
+            return self._judge(joint.apply(base, used))
+        small = None if self._make_passes is None else self._make_passes(base)
+        if hasattr(joint.law, "at_speed"):
+            return self._solve_rates(base, joint, small)
+        if small is not None and small.stiffness is not None and base.surface.total:
+            return self._solve_small(base, joint, used, small)
+        return self._solve_whole(base, joint, used)
+
+    def _judge(self, step: StepProblem) -> tuple[StepProblem, Certified]:
+        """Return a step and its certified answer, with ``law`` in the certificate. Collective."""
+        certified = self._solve(_without_joint(step))
+        return step, _with_law(step, certified)
+
+    def _solve_whole(
+        self, base: StepProblem, joint: JointStep, used: Strength
+    ) -> tuple[StepProblem, Certified]:
+        """Solve by passes that are whole steps. Collective.
+
+        Args:
+            base: the step without its joint.
+            joint: at the beginning.
+            used: the strength to begin with.
+        """
+        acceleration = Anderson(base.surface.comm.sum)
+        for count in range(1, MOST + 1):
+            step, certified = self._judge(joint.apply(base, used))
+            if certified.certificate.law <= self._tolerance:
+                self.passes.append(count)
+                return step, certified
+            g1, s1 = joint.find_end(step, certified.result)
+            used = _extrapolate(acceleration, used, joint.ask(g1, s1))
+        raise self._refuse(base, certified.certificate.law)
+
+    def _solve_small(
+        self, base: StepProblem, joint: JointStep, used: Strength, small: CondensedPasses
+    ) -> tuple[StepProblem, Certified]:
+        """Solve by passes on the contact unknowns. Collective.
+
+        Args:
+            base: the step without its joint.
+            joint: at the beginning.
+            used: the strength to begin with.
+            small: makes the passes.
+        """
+        surface = base.surface
+        small.begin(base)
+        lag = np.inf
+        least = np.inf
+        part = 1.0  # of Newton's step that is gone
+        snaps = False
+        end: PassEnd | None = None
+        for count in range(1, MOST + 1):
+            step = joint.apply(base, used)
+            push = _find_push(step, base, small.width)
+            end = small.make(step, push, end)
+            g1, s1 = joint.end_at(
+                surface.mine(end.gap), surface.mine(end.slip), surface.mine(end.closed)
+            )
+            there = joint.ask(g1, s1)
+            r_n = np.maximum(surface.mine(end.r[:, 0]), 0.0) / step.scale
+            friction = np.abs(there.mu - used.mu) * r_n
+            force = max_abs(step.b) / step.scale
+            lag = compare(surface, there, used, friction, used.mu * r_n, force)
+            if lag <= AIM * self._tolerance:
+                self.passes.append(count)
+                return self._finish(step, small, push, end)
+            part = min(1.0, 2.0 * part) if lag < least else 0.5 * part
+            least = min(least, lag)
+            correction = correct(joint, end, small, (g1, s1), there, used, step.scale)
+            if correction is None:
+                snaps = self._tell_snap(base, told=snaps)
+                used = there
+                continue
+            g2, s2 = correction
+            used = joint.ask(g1 + part * (g2 - g1), s1 + part * (s2 - s1))
+        raise self._refuse(base, lag)
+
+    def _finish(
+        self, step: StepProblem, small: CondensedPasses, push: Array, end: PassEnd
+    ) -> tuple[StepProblem, Certified]:
+        """Return the answer of the last pass; a whole step where it is not certified. Collective.
+
+        Args:
+            step: the step for r' with the strength of the last pass.
+            small: which has made it.
+            push: its further forces.
+            end: where it has led.
+        """
+        result = small.finish(push, end)
+        certificate = kkt_residual(step, result)
+        if certificate.worst <= self._tolerance:
+            return step, Certified(result, certificate, escalated=False)
+        step, certified = self._judge(step)
+        if not certified.certificate.law <= self._tolerance:
+            raise self._refuse(step, certified.certificate.law)
+        return step, certified
+
+    def _solve_rates(
+        self, base: StepProblem, joint: JointStep, small: CondensedPasses | None
+    ) -> tuple[StepProblem, Certified]:
+        """Solve a step of a law of slip rates. Collective.
+
+        Args:
+            base: the step without its joint.
+            joint: at the beginning.
+            small: makes the passes; None: there is none.
+        """
+        if small is None or small.stiffness is None or small.width == 1:
+            raise StepFailure(
+                f"{type(joint.law).__name__} is solved for the slip rate on the contact unknowns: "
+                "give solver=Condensed()"
+            )
+        if self._rates is None:
+            self._rates = RatePasses(small)
+        step, push, end, count = self._rates.solve(base, joint)
+        self.passes.append(count)
+        return self._finish(step, small, push, end)
+
+    def _tell_snap(self, base: StepProblem, *, told: bool) -> bool:
+        """Log, once a step on rank 0, that it has several answers; return True: it is told.
+
+        Args:
+            base: the step.
+            told: whether this has been done.
+        """
+        if told:
+            return True
+        self.snapped += 1
+        if base.surface.comm.rank == 0:
+            log.info(
+                "step %d at t = %.6g s: the joint snaps back inside the step, so the answer that "
+                "is reached from the strength before it is taken",
+                base.k,
+                base.t,
+            )
+        return True
+
+    def _refuse(self, base: StepProblem, lag: float) -> StepFailure:
+        """Return the error of a step whose strength is not that of its answer."""
+        self.passes.append(MOST)
+        return StepFailure(
+            f"step {base.k} at t = {base.t:.6g} s: after {MOST} passes the strength of the joint "
+            f"still changes by {lag:.1e} of the largest: {self._advice}"
+        )
+
+
+def _without_joint(step: StepProblem) -> StepProblem:
+    """Return the step as solvers see it, whose certificate says nothing of the law."""
+    return replace(step, joint=None)
+
+
+def _with_law(step: StepProblem, certified: Certified) -> Certified:
+    """Return a certified answer with ``law`` in its certificate. Collective."""
+    law = judge_strength(step, certified.result)
+    certificate = replace(certified.certificate, law=law)
+    return replace(certified, certificate=certificate)
+
+
+def _find_push(step: StepProblem, base: StepProblem, width: int) -> Array:
+    """Return by which forces (M width,) a step differs from its base, on every rank. Collective.
+
+    Args:
+        step: the step for r'.
+        base: without the joint.
+        width: contact unknowns of a condition.
+    """
+    surface = step.surface
+    change = step.b - base.b
+    normal = surface.normal_values(change)[:, None]
+    rows = normal if width == 1 else np.hstack([normal, surface.tangential_values(change)])
+    return np.asarray(surface.everywhere(rows)).ravel()
+
+
+def _extrapolate(acceleration: Anderson, used: Strength, there: Strength) -> Strength:
+    """Return the next strength of passes without Newton's method. Collective.
+
+    Args:
+        acceleration: what the passes have shown.
+        used: the strength of a pass [N].
+        there: that of its answer.
+    """
+    # Forces and mu are of unlike sizes, and Anderson's method weighs differences: mu counts in the
+    # size of the forces.
+    size = max(max_abs(used.tension), max_abs(used.cohesion), max_abs(used.water))
+    scale = np.array([1.0, 1.0, size or 1.0, 1.0])
+    before = np.concatenate([s * part for s, part in zip(scale, used, strict=True)])
+    after = np.concatenate([s * part for s, part in zip(scale, there, strict=True)])
+    found = np.maximum(acceleration.extrapolate(before, after - before), 0.0)
+    tension, cohesion, mu, water = found.reshape(4, -1) / scale[:, None]
+    return Strength(tension, np.maximum(cohesion, mu * tension), mu, water)
