@@ -132,7 +132,7 @@ def test_a_wrong_strength_is_caught_by_law_alone() -> None:
         joint=None,
     )
     other = replace(joint, used=None).apply(base, wrong)
-    _, solver = stepper.prepared[1e-3]
+    solver = stepper.prepared[1e-3]
     result = solver.first.solve(replace(other, joint=None))
     certificate = kkt_residual(other, result)
     assert replace(certificate, law=0.0).worst < 1e-13
