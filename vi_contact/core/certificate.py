@@ -27,6 +27,10 @@ class Certificate:
         resultant: of static stages, the largest |w·(b - B_nᵀ r_n - B_tᵀ r_t)| over max |w| times
             the sum of |b| and |Bᵀr| on a body, for its rigid motions w that no prescribed
             displacement holds: nodal residuals may be small and add up.
+        material: of bodies that yield, the largest residual of the laws at points of integration at
+            the end of the step: the yield function above zero over the largest stress, and the flow
+            rule over the largest elastic strain, computed beside the return to the yield surface
+            and not by it (``laws.yielding``).
 
     The references are maxima over all unknowns, so that a wide gap blunts no residual:
     x_ref = max(|x|, |guess|), r_ref = max(|b|, |K u|, |r_n|), t_ref = max(limit, |r_t|,
@@ -41,6 +45,7 @@ class Certificate:
     cone: float = 0.0
     dissipation: float = 0.0
     resultant: float = 0.0
+    material: float = 0.0
 
     @cached_property
     def worst(self) -> float:

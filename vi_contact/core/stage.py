@@ -30,6 +30,7 @@ from typing import Any
 import numpy as np
 
 from .algebra import Array, EffectiveMatrix, Mask, Matrix
+from .internal import InternalForce
 from .problem import ContactProblem
 from .step import Balance, State, StepProblem, StepResult
 from .system import SemiDiscreteSystem
@@ -79,8 +80,11 @@ class Stage:
         weight: of this balance in the mean equation of the step.
         before: makes the balance at the beginning of the step, which has the weight 1 - ``weight``;
             None where this balance is the mean one but for its weight.
-        old: (share u0, share p(u0)) where the displacement of the stage is a sum share u0 + x over
-            both ends, at each of which the internal force p of a body that is not linear is taken.
+        old: (share u0, share p(u0)) where the displacement of the stage is a sum share u0 + end u1
+            over both ends, at each of which the internal force p of a body that is not linear is
+            taken.
+        end: the share of u1 in that sum.
+        internal: p of this step, where it depends on the past; None for that of the equations.
         of_momentum: whether the mean acceleration of the step is (v1 - v0)/dt.
     """
 
@@ -100,6 +104,8 @@ class Stage:
     weight: float = 1.0
     before: Callable[[], Balance] | None = None
     old: tuple[Array, Array] | None = None
+    end: float = 1.0
+    internal: InternalForce | None = None
     of_momentum: bool = True
 
     def find_internal(self, system: SemiDiscreteSystem, d: Array | None = None) -> Array:
@@ -112,8 +118,12 @@ class Stage:
             system: the equations that are marched.
             d: the increment (n,); None for zero.
         """
-        internal = system.internal_force(self.find_place(d))
-        return internal if self.old is None else self.old[1] + internal
+        place = self.find_place(d)
+        law = self.internal
+        internal = system.internal_force(place) if law is None else law.force(place)
+        if self.old is None:
+            return internal
+        return self.old[1] + (internal if self.end == 1.0 else self.end * internal)
 
     def find_place(self, d: Array | None = None) -> Array:
         """Return the displacement (n,) [m] at which the internal force is asked for.
@@ -122,7 +132,9 @@ class Stage:
             d: the increment (n,); None for zero.
         """
         u: Any = self.u.at_guess if d is None else self.u(d)
-        return u if self.old is None else u - self.old[0]
+        if self.old is None:
+            return u
+        return u - self.old[0] if self.end == 1.0 else (u - self.old[0]) / self.end
 
 
 @dataclass(frozen=True)

@@ -33,6 +33,7 @@ from ..solvers.automatic import Automatic
 from ..solvers.certified import TOLERANCE, CertifiedSolver
 from ..solvers.door import refuse_matrix, refuse_nan
 from ..solvers.nonlinear import NonlinearSolver
+from .materials import certify_material, remember_material, stand
 from .method import check_methods
 from .proximal import Proximal
 
@@ -228,7 +229,8 @@ class Equilibria:
             old: the state before.
             t: the time [s].
         """
-        stage = self._pose_stage(old, t)
+        system = self._problem.standing_at(old, "static_load").static_load
+        stage = stand(system, self._pose_stage(old, t))
         if self.curved is None:
             self.curved = NonlinearSolver(
                 self._problem,
@@ -240,7 +242,11 @@ class Equilibria:
             )
         step, certified = self.curved.solve(stage)
         answer = complete(stage, step, certified.result)
-        return _stand_still(old, t, answer, certified.certificate)
+        state = remember_material(
+            system, _stand_still(old, t, answer, certified.certificate)
+        )
+        whole = certify_material(system, certified.certificate, state, self._tolerance)
+        return replace(state, certificate=whole.worst)
 
 
 def _stand_still(

@@ -29,6 +29,7 @@ from ..core.state_checks import initial_state
 from ..core.step import Report, Scheme, Solver, State, StepProblem
 from ..solvers.certified import TOLERANCE, Certified, CertifiedSolver
 from ..solvers.nonlinear import NonlinearSolver
+from .materials import certify_material, keep_material, remember_material, stand
 from .method import Method, choose_method
 
 FACTORS = 12  # lengths of steps whose factors are kept by a Stepper
@@ -174,7 +175,9 @@ class Stepper:
             return self.state
         method = self.method
         with together(method.problem.surface.comm):  # it may ask for loads, which are the user's
-            return method.scheme.start(method.problem, self.state, dt)
+            problem = method.problem.standing_at(self.state)
+            state = method.scheme.start(problem, self.state, dt)
+        return keep_material(problem, self.state, state)
 
     def _attempt(self, dt: float) -> Report:
         """Return a step of dt [s].
@@ -187,10 +190,10 @@ class Stepper:
 
     def _make_step(self, dt: float) -> Report:
         """Do the work of ``_attempt``, in its frame of all ranks."""
-        problem = self.method.problem
         scheme = self.method.scheme
-        surface = problem.surface
+        surface = self.method.problem.surface
         state = self._convert_state(dt)
+        problem = self.method.problem.standing_at(state)
 
         # The scheme says where the balance holds: one inequality A d = b with contact.
         with together_if_own(surface.comm, scheme):
@@ -200,6 +203,7 @@ class Stepper:
         if problem.equations.internal is None:
             stage, step, certified = self._solve_linear(stage, state, dt)
         else:
+            stage = stand(problem.equations, stage)
             step, certified = self._solve_nonlinear(stage, dt)
         answer = complete(stage, step, certified.result)
 
@@ -208,6 +212,10 @@ class Stepper:
             free = scheme.finish(problem, state, stage, answer, dt)
         with together_if_own(surface.comm, problem.impact or scheme):
             new = after_impact(problem, scheme, state, free, dt)
+        new = remember_material(problem.equations, new)
+        certificate = certify_material(
+            problem.equations, certified.certificate, new, self.method.tolerance
+        )
         for vector in (free.u, free.v, new.u, new.v):
             freeze(vector)  # states are handed out, and the next step is made of them
         return Report(
@@ -217,7 +225,7 @@ class Stepper:
             v_minus=free.v,
             step=step,
             result=certified.result,
-            certificate=certified.certificate,
+            certificate=certificate,
             # formed only if some recorder asks for it
             averages=partial(average, problem, stage, answer, state, free),
             escalated=certified.escalated,

@@ -102,6 +102,7 @@ def position_stage(
     weight: float = 1.0,
     before: Callable[[], Balance] | None = None,
     old: tuple[float, Array] | None = None,
+    end: float = 1.0,
     of_momentum: bool = True,
 ) -> Stage:
     """Return the stage of a step in x = u1, with gap and slip at the end of the step.
@@ -120,8 +121,9 @@ def position_stage(
         carried: Bᵀr (n,) [N] of reactions of the beginning; None for none.
         weight: of this balance in the mean equation of the step.
         before: makes the balance at the beginning, with the weight 1 - ``weight``; None for none.
-        old: (share, u0) where u is a sum share u0 + u1 over both ends; None where it is no such
-            sum.
+        old: (share, u0) where u is a sum share u0 + end u1 over both ends; None where it is no
+            such sum.
+        end: the share of u1 in that sum.
         of_momentum: whether the mean acceleration of the step is (v1 - v0)/dt.
 
     Returns:
@@ -150,6 +152,7 @@ def position_stage(
         weight=weight,
         before=before,
         old=of_start,
+        end=end,
         of_momentum=of_momentum,
     )
 

@@ -57,6 +57,7 @@ class AlphaStep(BalanceStep, ABC):
     """
 
     by_rows: ClassVar[bool] = True
+    takes_ends: ClassVar[bool] = True
 
     @property
     @abstractmethod

@@ -255,7 +255,7 @@ class NonlinearSolver:
     def _take_tangent(self, walk: Walk) -> None:
         """Go on with the tangent of where the walk is. Collective."""
         stage = walk.stage
-        internal = self._system.internal
+        internal = stage.internal or self._system.internal
         assert internal is not None  # linear bodies have no walk
         self.tangents += 1
         walk.solver = self._reference  # the tangent before gives its memory back
