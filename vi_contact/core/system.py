@@ -29,7 +29,7 @@ from .algebra import (
 from .checks import array, function, instance, provides, quote, several
 from .collective import keep_error
 from .errors import InputError
-from .internal import InternalForce, turn
+from .internal import InternalForce, turn_force
 
 
 class Companion(Protocol):
@@ -473,7 +473,7 @@ class SemiDiscreteSystem:
             base_mass=_map_columns(T.transpose_apply, self.base_mass),
             u0=inverse(self.u0),
             v0=inverse(self.v0),
-            internal=turn(self.internal, T, self.algebra),
+            internal=turn_force(self.internal, T, self.algebra),
         )
 
 

@@ -130,7 +130,7 @@ def position_stage(
         The stage: bound is the gap (m,) [m] of the undeformed body at the end, slip is measured
         from B_t u0 and what the obstacle slides, and slip rates are slips over dt.
     """
-    end = state.t + dt
+    after = state.t + dt
     of_start = None
     if old is not None and problem.equations.internal is not None:
         share, u0 = old
@@ -142,10 +142,10 @@ def position_stage(
         a=a,
         load=load,
         scale=scale,
-        bound=problem.surface.gap(end),
-        slip0=problem.slip_origin(state.u, state.t, end),
+        bound=problem.surface.gap(after),
+        slip0=problem.slip_origin(state.u, state.t, after),
         active=state.active if active is None else active,
-        t=end,
+        t=after,
         k=state.k + 1,
         rate_factor=1.0 / dt,
         carried=carried,

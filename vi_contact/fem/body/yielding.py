@@ -108,7 +108,7 @@ class YieldingForce:
         other = YieldingForce(self._space, self._points, self._parts, self._virgin)
         if not known:
             return other
-        other._u = u
+        other._u = np.array(u)
         other._states = [
             {
                 name: self._by_points(memory[f"{part.name}{name}"])
