@@ -20,7 +20,7 @@ import numpy as np
 
 from ..core.algebra import Array
 from ..core.errors import InputError
-from ..core.quantities import RATIO
+from ..core.quantities import RATIO, Remedy
 from .mandel import ROOT, deviator, deviator_matrix, dot, identity, norm, over, trace
 from .yielding import PointState, YieldingMaterial, largest_of
 
@@ -37,7 +37,9 @@ class Iwan(YieldingMaterial):
             should be near 1; beyond the last the stress stays.
     """
 
-    curve: Annotated[Sequence[tuple[float, float]], RATIO]
+    curve: Annotated[
+        Sequence[tuple[float, float]], Remedy("give pairs (shear strain, G/Gmax)"), RATIO
+    ]
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -9,12 +9,13 @@ the surface is one linear equation (Simo and Hughes, Computational Inelasticity 
 """
 
 from dataclasses import dataclass
+from math import inf
 from typing import Annotated
 
 import numpy as np
 
 from ..core.algebra import Array
-from ..core.quantities import NotNegative, Positive, Unit
+from ..core.quantities import Between, Positive, Unit
 from .mandel import deviator, deviator_matrix, dot, norm, over
 from .yielding import (
     ROUND_OFF,
@@ -25,8 +26,8 @@ from .yielding import (
     largest_of,
 )
 
-HARDENS = "softening has answers that depend on the mesh, so give zero or a positive number"
-Hardening = Annotated[float, NotNegative, Unit("Pa")]
+HARDENS = "give zero or a positive modulus, as answers of softening depend on the mesh"
+Hardening = Annotated[float, Between(0.0, inf, remedy=HARDENS), Unit("Pa")]
 RADIUS = float(np.sqrt(1.5))
 
 
