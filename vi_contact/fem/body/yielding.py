@@ -207,15 +207,17 @@ class YieldingForce:
     def residual(self, u: Array) -> float:
         """Return the largest residual of the laws at u, of all ranks. Collective.
 
-        Stresses are judged beside the largest of the body, strains beside its elastic strain.
+        Stresses are judged beside the largest of the body at both ends of the way, strains beside
+        its elastic strain.
         """
         reached = self._reach(u)
         comm = self._space.comm
         sizes = [0.0, 0.0]
-        for part, state in zip(self._parts, reached.states, strict=True):
-            strain = part.law.elastic_strain(state["sigma"])
-            sizes[0] = max(sizes[0], np.max(norm(state["sigma"]), initial=0.0))
-            sizes[1] = max(sizes[1], np.max(norm(strain), initial=0.0))
+        for part, old, new in zip(self._parts, self._states, reached.states, strict=True):
+            for state in (old, new):  # the end alone may be free of stress
+                strain = part.law.elastic_strain(state["sigma"])
+                sizes[0] = max(sizes[0], np.max(norm(state["sigma"]), initial=0.0))
+                sizes[1] = max(sizes[1], np.max(norm(strain), initial=0.0))
         stress, strain = comm.max(np.array(sizes))
         if stress == 0.0:
             return 0.0
