@@ -12,7 +12,7 @@ import vi_contact as vc
 from vi_contact import fem
 from vi_contact.core.algebra import largest, max_abs
 from vi_contact.core.errors import InputError
-from vi_contact.laws import DruckerPrager, Iwan, J2, LinearElastic, MohrCoulomb, Orthotropic
+from vi_contact.laws import J2, DruckerPrager, Iwan, LinearElastic, MohrCoulomb, Orthotropic
 from vi_contact.laws.mandel import ROOT
 from vi_contact.laws.yielding import YieldingMaterial
 from vi_contact.meshes.block import BlockMesh
@@ -179,7 +179,9 @@ def test_a_stress_at_the_start(comm: Any) -> None:
 
 def test_a_stress_outside_of_the_surface_is_refused(comm: Any) -> None:
     mesh, _, _ = block(comm)
-    with pytest.raises(InputError, match="outside of the yield surface of MohrCoulomb at .* points"):
+    with pytest.raises(
+        InputError, match="outside of the yield surface of MohrCoulomb at .* points"
+    ):
         fem.assemble(
             mesh,
             SOIL,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from vi_contact.core.errors import InputError
-from vi_contact.laws import DruckerPrager, Iwan, J2, MohrCoulomb
+from vi_contact.laws import J2, DruckerPrager, Iwan, MohrCoulomb
 from vi_contact.laws.mandel import ROOT, find_principal, to_tensors, to_vectors
 from vi_contact.laws.yielding import YieldingMaterial
 
@@ -277,7 +277,10 @@ def test_masings_loops(amplitude: float, n: int) -> None:
         assert found[-1] == pytest.approx(top, rel=1e-12)
     loop = found[steps:]
     strains = np.concatenate(
-        [np.linspace(amplitude, -amplitude, steps + 1), np.linspace(-amplitude, amplitude, steps + 1)[1:]]
+        [
+            np.linspace(amplitude, -amplitude, steps + 1),
+            np.linspace(-amplitude, amplitude, steps + 1)[1:],
+        ]
     )
     enclosed = np.sum(0.5 * np.diff(strains) * (loop[1:] + loop[:-1]))
     assert enclosed / (2.0 * np.pi * top * amplitude) == pytest.approx(damping, rel=1e-3)
@@ -289,7 +292,9 @@ def test_masing_damping_of_the_hyperbola() -> None:
     table = [(float(g), float(1.0 / (1.0 + g / r))) for g in np.geomspace(1e-3 * r, 4.0 * r, 300)]
     law = Iwan(2.08e8, 0.3, 2000.0, table)
     found = shear(law, (2.0 * r, -2.0 * r, 2.0 * r), 400)[400:]
-    strains = np.concatenate([np.linspace(2.0 * r, -2.0 * r, 401), np.linspace(-2.0 * r, 2.0 * r, 401)[1:]])
+    strains = np.concatenate(
+        [np.linspace(2.0 * r, -2.0 * r, 401), np.linspace(-2.0 * r, 2.0 * r, 401)[1:]]
+    )
     area = np.sum(0.5 * np.diff(strains) * (found[1:] + found[:-1]))
     assert area / (4.0 * np.pi * r * found[0]) == pytest.approx(0.22414209, rel=2e-3)
 
@@ -313,7 +318,12 @@ def test_a_stress_in_place_carries_iwans_elements_and_makes_no_energy() -> None:
 
 def test_tension_is_cut_off_at_the_tip() -> None:
     """Pulled apart, soil keeps c/tan phi in all directions, whatever its dilatancy."""
-    for name in ("cone", "cone without dilatancy", "Mohr-Coulomb", "Mohr-Coulomb without dilatancy"):
+    for name in (
+        "cone",
+        "cone without dilatancy",
+        "Mohr-Coulomb",
+        "Mohr-Coulomb without dilatancy",
+    ):
         law = LAWS[name]
         tip = 1e4 / np.tan(np.radians(30.0))
         de = np.array([[1e-2, 1e-2, 0.9e-2, 1e-4]])

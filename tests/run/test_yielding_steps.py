@@ -228,9 +228,7 @@ def test_a_checkpoint_of_other_materials_is_refused(comm: Any, tmp_path: Path) -
 
 
 @pytest.mark.serial
-def test_another_length_of_steps_keeps_what_materials_remember(
-    comm: Any, tmp_path: Path
-) -> None:
+def test_another_length_of_steps_keeps_what_materials_remember(comm: Any, tmp_path: Path) -> None:
     """A changed dt makes schemes begin anew; the body stays deformed, as a stepper shows."""
     problem = throw(comm)
     dt = step_of("J2")

@@ -6,7 +6,7 @@ from typing import Any
 
 import vi_contact as vc
 from vi_contact import fem
-from vi_contact.laws import DruckerPrager, Iwan, J2, MohrCoulomb
+from vi_contact.laws import J2, DruckerPrager, Iwan, MohrCoulomb
 from vi_contact.meshes.block import BlockMesh
 
 STEEL = J2(200e9, 0.3, 7800.0, 250e6, isotropic=2e9, kinematic=4e9)

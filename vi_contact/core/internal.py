@@ -157,7 +157,9 @@ class RememberingInTurnedUnknowns(InTurnedUnknowns):
         return self.internal.residual(self.T @ u)
 
 
-def turn_force(internal: InternalForce | None, T: Matrix, algebra: Algebra) -> InTurnedUnknowns | None:
+def turn_force(
+    internal: InternalForce | None, T: Matrix, algebra: Algebra
+) -> InTurnedUnknowns | None:
     """Return an internal force in the unknowns û of u = T û; None for None.
 
     Args:

@@ -117,10 +117,6 @@ class DruckerPrager(YieldingMaterial):
         sigma = state["sigma"]
         return norm(deviator(sigma)) / ROOT + eta * trace(sigma) / 3.0 - strength
 
-    def stored(self, state: PointState) -> Array:
-        """Return W (q,) [J/m³]: the law is without hardening."""
-        return super().stored(state)
-
     def stress(
         self, de: Array, old: PointState, tangent: bool = True
     ) -> tuple[dict[str, Array], Array | None]:
@@ -144,7 +140,7 @@ class DruckerPrager(YieldingMaterial):
         gamma = np.where(beyond > rounding, A * beyond, 0.0)
         on = gamma > 0.0
         normal = over(s, size)
-        sigma = trial - gamma[:, None] * (ROOT * G * normal + K * etab * unit)
+        sigma: Array = trial - gamma[:, None] * (ROOT * G * normal + K * etab * unit)
 
         # Beyond the tip, where the cone would take more than all of the deviator.
         tip = on & (root < G * gamma)

@@ -100,9 +100,7 @@ class J2(YieldingMaterial):
         on = gamma > 0.0
         theta = (3.0 * G * gamma[on] / size[on])[:, None, None]
         along = normal[on, :, None] * normal[on, None, :]
-        D[on] -= 2.0 * G * (
-            theta * deviator_matrix(n) + (3.0 * G / resistance - theta) * along
-        )
+        D[on] -= 2.0 * G * (theta * deviator_matrix(n) + (3.0 * G / resistance - theta) * along)
         return new, D
 
     def residual(
@@ -124,6 +122,4 @@ class J2(YieldingMaterial):
             np.abs(new["alpha"] - old["alpha"] - norm(flow) / RADIUS) / strain,
             norm(new["beta"] - old["beta"] - 2.0 / 3.0 * self.kinematic * flow) / stress,
         )
-        return largest_of(
-            np.maximum(f, 0.0) / stress, choose_flow([still, plastic]), hardening
-        )
+        return largest_of(np.maximum(f, 0.0) / stress, choose_flow([still, plastic]), hardening)

@@ -242,9 +242,7 @@ class Equilibria:
             )
         step, certified = self.curved.solve(stage)
         answer = complete(stage, step, certified.result)
-        state = remember_material(
-            system, _stand_still(old, t, answer, certified.certificate)
-        )
+        state = remember_material(system, _stand_still(old, t, answer, certified.certificate))
         whole = certify_material(system, certified.certificate, state, self._tolerance)
         return replace(state, certificate=whole.worst)
 

@@ -212,22 +212,11 @@ def assemble(
 
     # the body: weak forms of its materials or of the user, absorbing boundaries, loads
     materials = [] if material is None else cell_materials(mesh, material)
-    body: ElasticForms
     if any(isinstance(given, YieldingMaterial) for _, given in materials):
         refuse_in_yielding(forms, conditions.loads)
-        body = YieldingForms(
-            space,
-            materials,
-            section,
-            damping,
-            integration=integration,
-            initial_stress=initial_stress,
-        )
-    elif forms is None:
-        selective = integration == "selective"
-        body = ElasticForms(space, materials, section, damping, selective=selective)
-    else:
-        body = OwnForms(space, forms, materials, section, damping)
+    body = _state_body(
+        space, materials, forms, section, damping, integration=integration, stress=initial_stress
+    )
     body.boundaries = conditions.dashpots
     check_ratios(
         damping,
@@ -286,6 +275,37 @@ def assemble(
     del absorbers, reduced
     give_back(mesh.comm)
     return system
+
+
+def _state_body(
+    space: FemSpace,
+    materials: list[tuple[Any, Any]],
+    forms: Forms | None,
+    section: Section,
+    damping: Damping,
+    *,
+    integration: str,
+    stress: Callable[[Array], Array] | None,
+) -> ElasticForms:
+    """Return the forms of the body: of its materials, elastic or yielding, or the user's.
+
+    Args:
+        space: the body's unknowns.
+        materials: pairs of local cells and a material.
+        forms: the user's own, or None.
+        section: that of the body.
+        damping: the law of C.
+        integration: "full", "selective" or "bbar".
+        stress: that of a yielding body at the start, or None.
+    """
+    if forms is not None:
+        return OwnForms(space, forms, materials, section, damping)
+    if any(isinstance(given, YieldingMaterial) for _, given in materials):
+        return YieldingForms(
+            space, materials, section, damping, integration=integration, initial_stress=stress
+        )
+    selective = integration == "selective"
+    return ElasticForms(space, materials, section, damping, selective=selective)
 
 
 def _gather_companions(

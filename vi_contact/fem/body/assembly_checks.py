@@ -12,7 +12,17 @@ import ufl
 from dolfinx.mesh import Mesh
 
 from ...core.algebra import total
-from ...core.checks import check_word, flag, function, instance, optional, provides, quote, several, whole
+from ...core.checks import (
+    check_word,
+    flag,
+    function,
+    instance,
+    optional,
+    provides,
+    quote,
+    several,
+    whole,
+)
 from ...core.errors import InputError
 from ...laws.materials import (
     BLIND_TO_RATIOS,

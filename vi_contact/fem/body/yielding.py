@@ -110,10 +110,7 @@ class YieldingForce:
             return other
         other._u = np.array(u)
         other._states = [
-            {
-                name: self._by_points(memory[f"{part.name}{name}"])
-                for name in start
-            }
+            {name: self._by_points(memory[f"{part.name}{name}"]) for name in start}
             for part, start in zip(self._parts, self._virgin, strict=True)
         ]
         return other
@@ -212,20 +209,22 @@ class YieldingForce:
         """
         reached = self._reach(u)
         comm = self._space.comm
-        sizes = [0.0, 0.0]
+        stress = strain = 0.0
         for part, old, new in zip(self._parts, self._states, reached.states, strict=True):
             for state in (old, new):  # the end alone may be free of stress
-                strain = part.law.elastic_strain(state["sigma"])
-                sizes[0] = max(sizes[0], np.max(norm(state["sigma"]), initial=0.0))
-                sizes[1] = max(sizes[1], np.max(norm(strain), initial=0.0))
-        stress, strain = comm.max(np.array(sizes))
+                sigma = state["sigma"]
+                stress = max(stress, float(np.max(norm(sigma), initial=0.0)))
+                elastic = part.law.elastic_strain(sigma)
+                strain = max(strain, float(np.max(norm(elastic), initial=0.0)))
+        stress, strain = comm.max(np.array([stress, strain])).tolist()
         if stress == 0.0:
             return 0.0
         worst = 0.0
         for part, old, new in zip(self._parts, self._states, reached.states, strict=True):
             way = reached.way[part.points]
-            own = part.law.residual(way, old, new, (float(stress), float(strain)))
-            worst = max(worst, np.max(own, initial=0.0)) if not np.any(np.isnan(own)) else np.inf
+            own = part.law.residual(way, old, new, (stress, strain))
+            size = float(np.max(own, initial=0.0))  # which keeps NaN
+            worst = max(worst, size if size >= 0.0 else np.inf)
         return float(comm.max(np.array([worst]))[0])
 
     def _add_up(self, densities: Sequence[Array]) -> float:
@@ -332,7 +331,7 @@ def make_starts(
         refuse([wrong] if wrong else [], space.comm)
         sigma = own.copy()
         sigma[:, 3 : 3 + len(PAIRS[n])] *= ROOT
-    starts = [part.law.start(sigma[part.points]) for part in parts]
+    starts: list[PointState] = [part.law.start(sigma[part.points]) for part in parts]
     defects = []
     for part, state in zip(parts, starts, strict=True):
         f = part.law.f(state)

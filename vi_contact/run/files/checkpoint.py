@@ -41,8 +41,8 @@ from numpy.lib import format as npy
 from ...core.algebra import largest, max_abs
 from ...core.checks import array, number, quote, refuse, whole
 from ...core.errors import InputError, is_of_machine
-from ...core.internal import MATERIAL, remembers, select_memory
 from ...core.files import on_root, write_atomically
+from ...core.internal import MATERIAL, remembers, select_memory
 from ...core.own_files import is_own, open_to_read
 from ...core.problem import ContactProblem
 from ...core.step import Scheme, State
@@ -157,7 +157,8 @@ def write_checkpoint(
         for name in vectors:
             arrays[name] = np.concatenate([own[name] for _, own in parts])[order]
         for name, of_ranks in gathered_cells.items():
-            numbers, rows = (np.concatenate(column) for column in zip(*of_ranks, strict=True))
+            columns = zip(*(of_ranks or []), strict=True)
+            numbers, rows = (np.concatenate(column) for column in columns)
             arrays[name] = rows[np.argsort(numbers)]
         arrays["about"] = np.array(about)
         buffer = io.BytesIO()
