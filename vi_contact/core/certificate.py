@@ -30,6 +30,10 @@ class Certificate:
         law: with a joint, the largest difference between its strength at the answer and the
             strength that the step was solved with, over the largest strength (``core.joints``); 0
             without one. A step solved with a wrong strength passes all residuals above.
+        material: of bodies that yield, the largest residual of the laws at points of integration at
+            the end of the step: the yield function above zero over the largest stress, and the flow
+            rule over the largest elastic strain, computed beside the return to the yield surface
+            and not by it (``laws.yielding``).
 
     The references are maxima over all unknowns, so that a wide gap blunts no residual:
     x_ref = max(|x|, |guess|), r_ref = max(|b|, |K u|, |r_n|), t_ref = max(limit, |r_t|,
@@ -45,6 +49,7 @@ class Certificate:
     dissipation: float = 0.0
     resultant: float = 0.0
     law: float = 0.0
+    material: float = 0.0
 
     @cached_property
     def worst(self) -> float:

@@ -7,10 +7,12 @@ sum of these works is the change of energy, whatever the scheme, unless the step
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from .algebra import Array
+from .internal import remembers
 from .problem import ContactProblem
 from .step import Balance, State
 from .system import SemiDiscreteSystem
@@ -20,7 +22,7 @@ from .system import SemiDiscreteSystem
 class StepEnergy:
     """Say where energy went in a step [J].
 
-    The ledger is change = input - damping - contact - friction - algorithmic + defect.
+    The ledger is change = input - damping - contact - friction - plastic - algorithmic + defect.
 
     Attributes:
         change: of kinetic and strain energy.
@@ -29,6 +31,7 @@ class StepEnergy:
         contact: work lost to the support, stored or dissipated there.
         friction: work lost in friction.
         algorithmic: what the time scheme loses, or gains where it is negative.
+        plastic: work dissipated where materials yield, >= 0.
     """
 
     change: float
@@ -37,6 +40,7 @@ class StepEnergy:
     contact: float
     friction: float
     algorithmic: float
+    plastic: float = 0.0
 
     @property
     def defect(self) -> float:
@@ -45,6 +49,7 @@ class StepEnergy:
         It is rounding and the tolerance of the solver when the step was solved.
         """
         explained = self.input - self.damping - self.contact - self.friction - self.algorithmic
+        explained -= self.plastic
         return self.change - explained
 
 
@@ -131,10 +136,15 @@ def energy_balance(
         algorithmic = du·M a - ½(v0 + v1)·M (v1 - v0) + du·K u - ½(u0 + u1)·K du
 
     algorithmic is 0 for the midpoint rule, and change is the difference of the energies themselves,
-    so the defect measures the equation of motion. Collective.
+    so the defect measures the equation of motion. Of a body that yields
+
+        plastic = ∫ D,    algorithmic has du·(p̄ - p1) + R in the place of its terms with K
+
+    with the mean p̄ of the scheme and p1 at the end of the step. R has a formula of its own
+    (``laws.yielding``), so the defect measures p1·du = ΔW + D + R too. Collective.
 
     Args:
-        problem: the problem that is marched.
+        problem: the problem that is marched; materials stand at ``old``.
         old: the state before the step.
         new: the state after it, before the impact law.
         balance: the equation of motion that the step satisfied.
@@ -147,6 +157,7 @@ def energy_balance(
     before = before or compute_energies(system, old.u, old.v)
     after = after or compute_energies(system, new.u, new.v)
     du = new.u - old.u
+    law: Any = system.internal if remembers(system.internal) else None
 
     # Works of this rank that are not there in every problem: of an obstacle that moves, of friction
     # and of damping.
@@ -168,8 +179,10 @@ def energy_balance(
         inertial = (du / balance.of_momentum, gained)
     if balance.internal is None:
         elastic = (balance.u - 0.5 * (old.u + new.u), after.elastic - before.elastic)
-    else:
+    elif law is None:
         elastic = (balance.internal, du)
+    else:
+        elastic = (balance.internal - after.elastic, du)
 
     # One reduction adds them up over the ranks, and others with them: the work of loads, the change
     # of kinetic energy, and the work of normal reactions.
@@ -183,7 +196,11 @@ def energy_balance(
         sums=(rubbing, pushing, dragging, damping),
     )
     loading, inertia, kinetic, stiffness, pressing, rubbing, pushing, dragging, damping = works
-    if balance.internal is not None:
+    plastic = 0.0
+    if law is not None:
+        plastic = law.dissipation(new.u)
+        stiffness += law.remainder(new.u)
+    elif balance.internal is not None:
         stiffness -= after.strain - before.strain
 
     # The support takes what reactions do on the motion relative to it. What they do on its own
@@ -195,6 +212,7 @@ def energy_balance(
         contact=pressing + pushing,
         friction=rubbing + dragging,
         algorithmic=inertia - kinetic + stiffness,
+        plastic=plastic,
     )
 
 

@@ -1,6 +1,7 @@
 """State the problem that is marched: a system, its contact surface, and the laws of both."""
 
 from collections.abc import Callable, Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -13,6 +14,7 @@ from .checks import array, instance, optional, provides, quote, refuse
 from .collective import Parts, agree
 from .corners import let_corners_rub
 from .errors import InputError
+from .internal import remembers
 from .joint_laws import JointLaw, refuse_overstressed
 from .protocols import EXCITATION, Excitation, FrictionLaw, Frictionless, ImpactLaw, MassLaw
 from .surfaces import ContactSurface
@@ -163,6 +165,23 @@ class ContactProblem:
         """Return the system in unknowns relative to the other side, where there is one."""
         coupling = self.surface.coupling
         return system if coupling is None else system.in_relative(coupling)
+
+    def standing_at(self, state: Any, name: str = "equations") -> "ContactProblem":
+        """Return the same problem whose materials go on from a state. Collective.
+
+        It is itself where materials have no memory. A copy shares all matrices and factors.
+
+        Args:
+            state: a ``core.step.State`` of this problem.
+            name: which of its systems is asked for, "equations" or "static_load".
+        """
+        if not remembers(self.system.internal):
+            return self
+        system: SemiDiscreteSystem = getattr(self, name)
+        internal: Any = system.internal
+        other = copy(self)
+        other.__dict__[name] = system.going_on(internal.go_on(state.memory, state.u))
+        return other
 
     @property
     def frictional(self) -> bool:

@@ -84,8 +84,10 @@ class Stage:
         weight: of this balance in the mean equation of the step.
         before: makes the balance at the beginning of the step, which has the weight 1 - ``weight``;
             None where this balance is the mean one but for its weight.
-        old: (share u0, share p(u0)) where the displacement of the stage is a sum share u0 + x over
-            both ends, at each of which the internal force p of a body that is not linear is taken.
+        old: (share u0, share p(u0)) where the displacement of the stage is a sum share u0 + end u1
+            over both ends, at each of which the internal force p of a body that is not linear is
+            taken.
+        end: the share of u1 in that sum.
         of_momentum: whether the mean acceleration of the step is (v1 - v0)/dt.
     """
 
@@ -106,6 +108,7 @@ class Stage:
     weight: float = 1.0
     before: Callable[[], Balance] | None = None
     old: tuple[Array, Array] | None = None
+    end: float = 1.0
     of_momentum: bool = True
 
     def find_internal(self, system: SemiDiscreteSystem, d: Array | None = None) -> Array:
@@ -119,7 +122,9 @@ class Stage:
             d: the increment (n,); None for zero.
         """
         internal = system.internal_force(self.find_place(d))
-        return internal if self.old is None else self.old[1] + internal
+        if self.old is None:
+            return internal
+        return self.old[1] + (internal if self.end == 1.0 else self.end * internal)
 
     def find_place(self, d: Array | None = None) -> Array:
         """Return the displacement (n,) [m] at which the internal force is asked for.
@@ -128,7 +133,9 @@ class Stage:
             d: the increment (n,); None for zero.
         """
         u: Any = self.u.find(d)
-        return u if self.old is None else u - self.old[0]
+        if self.old is None:
+            return u
+        return u - self.old[0] if self.end == 1.0 else (u - self.old[0]) / self.end
 
 
 @dataclass(frozen=True)

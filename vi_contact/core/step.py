@@ -65,7 +65,8 @@ class State:
         active: (m,) True for closed conditions.
         memory: what a scheme carries besides u and v: vectors (n,), and arrays that are the same on
             every rank. The class of the scheme says under which names; nobody else reads it. What
-            a joint has gone through is there too, arrays (m, …) (``core.joints``).
+            a joint has gone through is there too, arrays (m, …) (``core.joints``), and what
+            materials remember, arrays of owned cells (``core.internal.MATERIAL``).
         r_t: tangential reactions (m, d - 1) [N] of that step, None without friction.
         certificate: of the equilibrium that the state is; None of states that steps have led to.
     """
@@ -343,11 +344,13 @@ class Scheme(Protocol):
     """Turn a state into a StepProblem, and the answer into the next state: a time scheme.
 
     A scheme is a value without state of its own. What it carries from step to step is in
-    ``State.memory``, so that a checkpoint holds all of it. Two class variables, both False where
+    ``State.memory``, so that a checkpoint holds all of it. Three class variables, all False where
     they are missing, say more:
 
     - ``penetrates = True``: the contact condition is on velocities, so that states of its own runs
       may lie inside the obstacle, and the scheme goes on from them.
+    - ``takes_ends = True``: it takes the internal force at the ends of steps alone, as materials
+      that yield ask for.
     - ``by_rows = True``: it steps several runs at once. ``stage`` and ``finish`` then also get
       vectors as rows, (k, n) and (k, m), and return rows.
     """

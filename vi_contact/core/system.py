@@ -11,6 +11,7 @@ times (``load_at``), and whatever is made of the matrices once (``make_once``), 
 """
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
@@ -28,7 +29,7 @@ from .algebra import (
 from .checks import array, function, instance, provides, quote, several
 from .collective import keep_error
 from .errors import InputError
-from .internal import InternalForce, InTurnedUnknowns
+from .internal import InternalForce, turn_force
 
 
 class Companion(Protocol):
@@ -433,6 +434,13 @@ class SemiDiscreteSystem:
         force = self.M @ (self.influence @ direction)
         return force if self.base_mass is None else force + self.base_mass @ direction
 
+    def going_on(self, internal: InternalForce) -> "SemiDiscreteSystem":
+        """Return the same system with another internal force, and what this one remembers."""
+        # The dataclass is frozen, and a copy shares matrices, factors and loads: hence this way.
+        other = copy(self)
+        object.__setattr__(other, "internal", internal)
+        return other
+
     def in_basis(self, T: Matrix, dual: Matrix | None = None) -> "SemiDiscreteSystem":
         """Return the same system in the unknowns û of u = T û: TᵀMT, TᵀCT, TᵀKT, Tᵀf.
 
@@ -465,9 +473,7 @@ class SemiDiscreteSystem:
             base_mass=_map_columns(T.transpose_apply, self.base_mass),
             u0=inverse(self.u0),
             v0=inverse(self.v0),
-            internal=(
-                None if self.internal is None else InTurnedUnknowns(self.internal, T, self.algebra)
-            ),
+            internal=turn_force(self.internal, T, self.algebra),
         )
 
 

@@ -437,7 +437,7 @@ def assemble_into(form: Any, field: Any) -> None:
     """
     field.x.array[:] = 0.0
     fem.assemble_vector(field.x.array, form)
-    field.x.scatter_reverse(_ADD)
+    add_to_owners(field)
 
 
 def assemble_vector(form: Any) -> PETSc.Vec:
@@ -525,3 +525,34 @@ def continuous(space: Any) -> bool:
         parts = element.sub_elements()
         element = parts[0] if parts else element
     return element in ufl.H1
+
+
+# Points of integration
+# --------------------------------------------------------------------------------------------------
+
+
+def make_quadrature(mesh: Mesh, degree: int) -> tuple[Any, Any]:
+    """Return points (q, d) and weights (q,) of the reference cell, exact up to a degree."""
+    return basix.make_quadrature(getattr(basix.CellType, mesh.topology.cell_type.name), degree)
+
+
+def tabulate(mesh: Mesh, nodes: int, points: Any) -> tuple[Any, Any]:
+    """Return the Lagrange shape functions (q, n) of cells at points, and their slopes (d, q, n).
+
+    Args:
+        mesh: the mesh, of cells of first or second order.
+        nodes: n, how many nodes a cell of this element has.
+        points: (q, d) in the reference cell.
+    """
+    cell = getattr(basix.CellType, mesh.topology.cell_type.name)
+    degree = 1 if nodes == len(basix.topology(cell)[0]) else 2
+    element = basix.create_element(
+        basix.ElementFamily.P, cell, degree, basix.LagrangeVariant.gll_warped
+    )
+    table = element.tabulate(1, points)[:, :, :, 0]
+    return table[0], table[1:]
+
+
+def add_to_owners(field: Any) -> None:
+    """Add the ghost entries of a Function to those of their owners. Collective."""
+    field.x.scatter_reverse(_ADD)

@@ -1,3 +1,4 @@
+from .drucker_prager import DruckerPrager as DruckerPrager
 from .excitation import FullSine as FullSine
 from .excitation import HalfSine as HalfSine
 from .excitation import Harmonic as Harmonic
@@ -14,6 +15,8 @@ from .impact import Elastic as Elastic
 from .impact import ImpulseUpdate as ImpulseUpdate
 from .impact import Inelastic as Inelastic
 from .impact import Newton as Newton
+from .iwan import Iwan as Iwan
+from .j2 import J2 as J2
 from .joint import Joint as Joint
 from .joint_values import Prestress as Prestress
 from .mass import ConsistentMass as ConsistentMass
@@ -27,8 +30,10 @@ from .materials import PlaneStrain as PlaneStrain
 from .materials import PlaneStress as PlaneStress
 from .materials import Rayleigh as Rayleigh
 from .materials import Solid as Solid
+from .mohr_coulomb import MohrCoulomb as MohrCoulomb
 from .near_fault import NearFaultPulse as NearFaultPulse
 from .orthotropic import Orthotropic as Orthotropic
 from .rate_and_state import RateAndState as RateAndState
 from .slip_weakening import SlipWeakening as SlipWeakening
 from .weight import with_weight as with_weight
+from .yielding import YieldingMaterial as YieldingMaterial

@@ -14,6 +14,7 @@ from ..core.algebra import from_each, max_abs
 from ..core.checks import describe_point, provides, quote, real, several
 from ..core.collective import Parts, agree, together
 from ..core.errors import InputError
+from ..core.internal import remembers
 from ..core.problem import ContactProblem
 from ..core.state_checks import check_problem_given, check_sizes, read_start_time
 from ..core.step import Scheme, Solver, State
@@ -113,6 +114,7 @@ def choose_method(
     with together(comm):  # what is the user's own may fail on one rank
         method.bind()
         problem.equations.forget_loads()
+        _refuse_stage_forces(problem, scheme)
         scheme.check(problem)
         for solver in method.solvers:
             solver.check(problem)
@@ -160,6 +162,23 @@ def with_defaults(
         if shared is not None:
             return shared, scheme
     return problem, scheme
+
+
+def _refuse_stage_forces(problem: ContactProblem, scheme: Scheme) -> None:
+    """Raise InputError for a scheme that asks for stresses between the ends of a step.
+
+    What a material remembers is known at the ends alone.
+
+    Args:
+        problem: what is marched.
+        scheme: the time scheme.
+    """
+    if remembers(problem.system.internal) and not getattr(scheme, "takes_ends", False):
+        raise InputError(
+            f"{type(scheme).__name__} takes the stress of a body that yields between the ends of a "
+            "step, where it is not known: take Midpoint(), ZienkiewiczWoodTaylor(phi), "
+            "Trapezoidal(), HHT(alpha), GeneralisedAlpha(…) or Newmark(…)"
+        )
 
 
 def check_solver(owner: str, value: Any, meaning: str = "solver") -> None:

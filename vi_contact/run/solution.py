@@ -215,7 +215,7 @@ def _list_entries(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     entries += _fill_in(ENERGY, words)
     if "energy" in facts:
         for name, title in LEDGER.items():
-            if name != "energy_defect":
+            if name in facts["energy"] and name != "energy_defect":
                 entries.append((f"  {title}", f"{facts['energy'][name]: .6e}"))
     entries += _fill_in(DEFECT, words)
     for warning in filter(None, (energy_warning(facts), facts.get("sampling"))):

@@ -36,6 +36,7 @@ from ..solvers.door import refuse_matrix, refuse_nan
 from ..solvers.joints import JointSolver
 from ..solvers.nonlinear import NonlinearSolver
 from . import joint_steps
+from .materials import certify_material, remember_material
 from .method import check_methods
 from .proximal import Proximal
 
@@ -145,6 +146,7 @@ class Equilibria:
         solver = solver or Automatic()
         system = problem.static_load
         self._problem = problem
+        self._tolerance = tolerance
         self._K = EffectiveMatrix(
             system.K, system.algebra, space=system.space, inertia=(0.0, system.M)
         )
@@ -203,11 +205,7 @@ class Equilibria:
         with together(problem.surface.comm):
             problem.surface.refuse_driven(t)
             if problem.static_load.internal is not None:
-                stage = self._pose_stage(old, t)
-                step = pose(problem, stage, self._K, problem.static_load)
-                certified = self.solver.solve(step)
-                answer = complete(stage, step, certified.result)
-                return _stand_still(old, t, answer, certified.certificate)
+                return self._solve_nonlinear(old, t)
             step = StepProblem(
                 A=self._K,
                 b=problem.static_load.load.at_rest(t),
@@ -226,6 +224,23 @@ class Equilibria:
                 return self._solve_joint(step, old)
             certified = self.solver.solve(step)
         return _stand_still(old, t, certified.result, certified.certificate)
+
+    def _solve_nonlinear(self, old: State, t: float) -> State:
+        """Return the equilibrium of a body that is not linear at a time.
+
+        Args:
+            old: the state before.
+            t: the time [s].
+        """
+        problem = self._problem
+        system = problem.standing_at(old, "static_load").static_load
+        stage = self._pose_stage(old, t)
+        step = pose(problem, stage, self._K, system)
+        certified = self.solver.solve(step)
+        answer = complete(stage, step, certified.result)
+        state = remember_material(system, _stand_still(old, t, answer, certified.certificate))
+        whole = certify_material(system, certified.certificate, state, self._tolerance)
+        return replace(state, certificate=whole.worst)
 
     def _solve_joint(self, base: StepProblem, old: State) -> State:
         """Return the equilibrium of a joint, whose strength is that at the end of the stage.

@@ -32,6 +32,7 @@ from ..solvers.certified import TOLERANCE, CertifiedSolver
 from ..solvers.joints import JointSolver
 from ..solvers.nonlinear import NonlinearSolver
 from . import joint_steps
+from .materials import certify_material, keep_material, remember_material
 from .method import Method, choose_method
 
 FACTORS = 12  # lengths of steps whose factors are kept by a Stepper
@@ -177,7 +178,9 @@ class Stepper:
             return self.state
         method = self.method
         with together(method.problem.surface.comm):  # it may ask for loads, which are the user's
-            return method.scheme.start(method.problem, self.state, dt)
+            problem = method.problem.standing_at(self.state)
+            state = method.scheme.start(problem, self.state, dt)
+        return keep_material(problem, self.state, state)
 
     def _attempt(self, dt: float) -> Report:
         """Return a step of dt [s].
@@ -190,10 +193,10 @@ class Stepper:
 
     def _make_step(self, dt: float) -> Report:
         """Do the work of ``_attempt``, in its frame of all ranks."""
-        problem = self.method.problem
         scheme: Any = self.method.scheme
-        surface = problem.surface
+        surface = self.method.problem.surface
         state = self._convert_state(dt)
+        problem = self.method.problem.standing_at(state)
 
         # The scheme says where the balance holds: one inequality A d = b with contact.
         with together_if_own(surface.comm, scheme):
@@ -224,6 +227,10 @@ class Stepper:
             new = after_impact(problem, scheme, state, free, dt)
         if step.joint is not None:
             new = joint_steps.commit(new, step, certified.result)
+        new = remember_material(problem.equations, new)
+        certificate = certify_material(
+            problem.equations, certified.certificate, new, self.method.tolerance
+        )
         for vector in (free.u, free.v, new.u, new.v):
             freeze(vector)  # states are handed out, and the next step is made of them
         return Report(
@@ -233,7 +240,7 @@ class Stepper:
             v_minus=free.v,
             step=step,
             result=certified.result,
-            certificate=certified.certificate,
+            certificate=certificate,
             # formed only if some recorder asks for it
             averages=partial(average, problem, stage, moving, state, free),
             escalated=certified.escalated,

@@ -119,6 +119,7 @@ def position_stage(
     weight: float = 1.0,
     before: Callable[[], Balance] | None = None,
     old: tuple[float, Array] | None = None,
+    end: float = 1.0,
     of_momentum: bool = True,
 ) -> Stage:
     """Return the stage of a step in x = u1, with gap and slip at the end of the step.
@@ -138,15 +139,16 @@ def position_stage(
         carried_reactions: these reactions [N]; None: they are read out of Bᵀr.
         weight: of this balance in the mean equation of the step.
         before: makes the balance at the beginning, with the weight 1 - ``weight``; None for none.
-        old: (share, u0) where u is a sum share u0 + u1 over both ends; None where it is no such
-            sum.
+        old: (share, u0) where u is a sum share u0 + end u1 over both ends; None where it is no
+            such sum.
+        end: the share of u1 in that sum.
         of_momentum: whether the mean acceleration of the step is (v1 - v0)/dt.
 
     Returns:
         The stage: bound is the gap (m,) [m] of the undeformed body at the end, slip is measured
         from B_t u0 and what the obstacle slides, and slip rates are slips over dt.
     """
-    end = state.t + dt
+    after = state.t + dt
     of_start = None
     if old is not None and problem.equations.internal is not None:
         share, u0 = old
@@ -158,10 +160,10 @@ def position_stage(
         a=a,
         load=load,
         scale=scale,
-        bound=problem.surface.gap(end),
-        slip0=problem.slip_origin(state.u, state.t, end),
+        bound=problem.surface.gap(after),
+        slip0=problem.slip_origin(state.u, state.t, after),
         active=state.active if active is None else active,
-        t=end,
+        t=after,
         k=state.k + 1,
         rate_factor=1.0 / dt,
         carried=carried,
@@ -169,6 +171,7 @@ def position_stage(
         weight=weight,
         before=before,
         old=of_start,
+        end=end,
         of_momentum=of_momentum,
     )
 

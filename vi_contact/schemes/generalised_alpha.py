@@ -58,6 +58,7 @@ class AlphaStep(BalanceStep, ABC):
 
     by_rows: ClassVar[bool] = True
     reads_reactions: ClassVar[bool] = True
+    takes_ends: ClassVar[bool] = True
 
     @property
     @abstractmethod

@@ -46,6 +46,7 @@ class Trapezoidal:
     """
 
     by_rows: ClassVar[bool] = True
+    takes_ends: ClassVar[bool] = True
 
     mass: MassLaw = field(default_factory=Redistributed)
 

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 from ..core.arguments import check_fields
+from ..core.internal import remembers
 from ..core.problem import ContactProblem
 from ..core.quantities import Between
 from ..core.stage import Affine, Answer, Stage
@@ -36,6 +37,7 @@ class ZienkiewiczWoodTaylor(SingleStep):
 
     by_rows: ClassVar[bool] = True
     takes_joints: ClassVar[bool] = True
+    takes_ends: ClassVar[bool] = True
 
     phi: Annotated[
         float, Between(0.5, 1.0, remedy="give a weight from 0.5 to 1, less is unstable")
@@ -56,6 +58,14 @@ class ZienkiewiczWoodTaylor(SingleStep):
         """
         phi = self.phi
         way = dt * state.v
+
+        # Where the stress depends on the past it is known at the ends of steps alone: the mean of
+        # both ends takes the place of the stress at the displacement of the stage.
+        old = None
+        end = 1.0
+        if remembers(problem.equations.internal):
+            old = (1.0 - phi, state.u)
+            end = phi
         return position_stage(
             problem,
             state,
@@ -66,6 +76,8 @@ class ZienkiewiczWoodTaylor(SingleStep):
             a=Affine(None, 1.0 / (phi * dt**2)),
             load=problem.equations.load_at(state.t + phi * dt),
             scale=1.0 / phi,
+            old=old,
+            end=end,
         )
 
     def finish(

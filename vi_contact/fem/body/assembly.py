@@ -32,6 +32,7 @@ from ...core.system import Load, SemiDiscreteSystem
 from ...core.timing import report_time
 from ...laws.free_motions import Unheld, floats
 from ...laws.materials import Damping, Section
+from ...laws.yielding import YieldingMaterial
 from .. import compat
 from ..matrices.half import algebra_for
 from ..matrices.petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
@@ -45,6 +46,7 @@ from .assembly_checks import (
     check_nodes,
     check_ratios,
     refuse_folded,
+    refuse_in_yielding,
 )
 from .conditions import as_tuple, gather_conditions
 from .dashpots import DashpotMatrix, Dashpots, describe_boundaries
@@ -57,6 +59,7 @@ from .loads import BodyForce, Prescribed, Traction, evaluate
 from .own_forms import Forms, OwnForms
 from .space import FemSpace, translations
 from .ties import Tied
+from .yielding_forms import YieldingForms
 
 Field = tuple[float, ...] | Callable[[Array], Array]
 Initial = Field | Sequence[tuple[Cells, Field]] | None
@@ -87,6 +90,7 @@ def assemble(
     degree: int = 1,
     quadrature_degree: int | None = None,
     integration: str = "full",
+    initial_stress: Annotated[Callable[[Array], Array] | None, Unit("Pa")] = None,
     space: Any = None,
     bcs: Any = (),
 ) -> SemiDiscreteSystem:
@@ -97,8 +101,9 @@ def assemble(
             order too.
         degree: degree of the displacement in each cell: 1 for P1 or Q1, 2 for P2 or Q2
             (docs/guide/second_order.md).
-        material: LinearElastic, Orthotropic or fem.Heterogeneous, or (cells, material) pairs that
-            cover the mesh.
+        material: LinearElastic, Orthotropic or fem.Heterogeneous, a material that yields
+            (``laws.J2``, DruckerPrager, MohrCoulomb, Iwan: docs/guide/yielding.md), or (cells,
+            material) pairs that cover the mesh.
         forms: the user's own weak forms, ``fem.Forms``; a material beside them gives the density
             where they have no mass, and the wave speeds that dashpots and free fields need. Without
             a mass at all the system is for static stages alone.
@@ -118,7 +123,11 @@ def assemble(
             share with prescribed nodes. True is right for motions relative to the ground; False is
             the load of docs/start/first_wall.md.
         integration: "full", or "selective" for nearly incompressible bodies of quadrilaterals or
-            hexahedra, where each cell has one mean value of tr eps (``dilatation``).
+            hexahedra, where each cell has one mean value of tr eps (``dilatation``). "bbar" is
+            the like for materials that yield.
+        initial_stress: of a body that yields, at the displacement zero: points (k, d) [m] ->
+            components (k, 4) xx, yy, zz, xy or (k, 6) xx, yy, zz, xy, yz, xz [Pa], tension
+            positive. Loads should hold it in equilibrium.
         initial_displacement: constant or points (k, d) -> (k, d) (eqs. 10, 10a), or (cells, value)
             pairs for several bodies. Where cells meet, the later pair counts; cells without a pair
             start from zero.
@@ -155,6 +164,7 @@ def assemble(
             "degree": degree,
             "quadrature_degree": quadrature_degree,
             "integration": integration,
+            "initial_stress": initial_stress,
         },
     )
 
@@ -173,6 +183,7 @@ def assemble(
         degree=degree,
         quadrature_degree=quadrature_degree,
         integration=integration,
+        initial_stress=initial_stress,
     )
     check_initial(mesh, displacement=initial_displacement, velocity=initial_velocity)
     conditions = gather_conditions(
@@ -201,11 +212,11 @@ def assemble(
 
     # the body: weak forms of its materials or of the user, absorbing boundaries, loads
     materials = [] if material is None else cell_materials(mesh, material)
-    if forms is None:
-        selective = integration == "selective"
-        body = ElasticForms(space, materials, section, damping, selective=selective)
-    else:
-        body = OwnForms(space, forms, materials, section, damping)
+    if any(isinstance(given, YieldingMaterial) for _, given in materials):
+        refuse_in_yielding(forms, conditions.loads)
+    body = _state_body(
+        space, materials, forms, section, damping, integration=integration, stress=initial_stress
+    )
     body.boundaries = conditions.dashpots
     check_ratios(
         damping,
@@ -266,6 +277,37 @@ def assemble(
     return system
 
 
+def _state_body(
+    space: FemSpace,
+    materials: list[tuple[Any, Any]],
+    forms: Forms | None,
+    section: Section,
+    damping: Damping,
+    *,
+    integration: str,
+    stress: Callable[[Array], Array] | None,
+) -> ElasticForms:
+    """Return the forms of the body: of its materials, elastic or yielding, or the user's.
+
+    Args:
+        space: the body's unknowns.
+        materials: pairs of local cells and a material.
+        forms: the user's own, or None.
+        section: that of the body.
+        damping: the law of C.
+        integration: "full", "selective" or "bbar".
+        stress: that of a yielding body at the start, or None.
+    """
+    if forms is not None:
+        return OwnForms(space, forms, materials, section, damping)
+    if any(isinstance(given, YieldingMaterial) for _, given in materials):
+        return YieldingForms(
+            space, materials, section, damping, integration=integration, initial_stress=stress
+        )
+    selective = integration == "selective"
+    return ElasticForms(space, materials, section, damping, selective=selective)
+
+
 def _gather_companions(
     body: ElasticForms, prescribed: Sequence[Prescribed], acting: Sequence[Any]
 ) -> tuple[Any, ...]:
@@ -282,8 +324,8 @@ def _gather_companions(
     companions = [companion for part in (*prescribed, *acting) for companion in part.companions]
     if companions and body.internal is not None:
         raise InputError(
-            "Forms: internal does not go with motions that are marched beside the run, such as a "
-            "free field, as these are linear: take fem.Dashpots there"
+            f"{body.nonlinear} does not go with motions that are marched beside the run, such as "
+            "a free field, as these are linear: take fem.Dashpots there"
         )
     return tuple(companions)
 

@@ -12,7 +12,17 @@ import ufl
 from dolfinx.mesh import Mesh
 
 from ...core.algebra import total
-from ...core.checks import check_word, flag, instance, optional, provides, quote, several, whole
+from ...core.checks import (
+    check_word,
+    flag,
+    function,
+    instance,
+    optional,
+    provides,
+    quote,
+    several,
+    whole,
+)
 from ...core.errors import InputError
 from ...laws.materials import (
     BLIND_TO_RATIOS,
@@ -26,12 +36,14 @@ from ...laws.materials import (
     Section,
     Solid,
 )
+from ...laws.yielding import YieldingMaterial
 from .. import compat
 from ..mesh.communicators import MpiComm
 from ..mesh.group_checks import cells_of, check_field
 from ..mesh.numbering import NodeTable
 from .form_checks import refuse_complex
 from .forms import KINDS
+from .initial_strains import InitialStrain
 from .own_forms import Forms
 
 log = logging.getLogger(__name__)
@@ -51,6 +63,7 @@ def check_body(
     degree: Any,
     quadrature_degree: Any,
     integration: Any,
+    initial_stress: Any,
 ) -> tuple[Section, Damping]:
     """Return (section, damping), the usual for None.
 
@@ -63,7 +76,8 @@ def check_body(
         base_inertia: whether the base counts.
         degree: that of the displacement.
         quadrature_degree: that of integrals, or None.
-        integration: "full" or "selective".
+        integration: "full", "selective" or "bbar".
+        initial_stress: a function of points, or None.
 
     Raises:
         InputError: objects of another kind, cells of another mesh.
@@ -101,6 +115,7 @@ def check_body(
     _check_integration(
         mesh, materials if forms is None else [forms], section, damping, degree, integration
     )
+    refuse_initial_stress(initial_stress, materials)
     thick = mesh.geometry.dim > 1 and not isinstance(section, PlaneStress)
     if forms is None and degree == 1 and thick and integration == "full" and mesh.comm.rank == 0:
         _tell_locking([given for given in materials if isinstance(given, LinearElastic)])
@@ -293,14 +308,27 @@ def _check_integration(
         degree: that of the displacement.
         integration: the word.
     """
-    check_word("integration of assemble", integration, ("full", "selective"))
+    check_word("integration of assemble", integration, ("full", "selective", "bbar"))
     if integration == "full":
         return
     if mesh.topology.cell_type.name not in ("quadrilateral", "hexahedron"):
         raise InputError(
-            "assemble: integration='selective' needs quadrilaterals or hexahedra, because other "
-            "cells lock with it too; take degree=2"
+            f"assemble: integration='{integration}' needs quadrilaterals or hexahedra, because "
+            "other cells lock with it too; take degree=2"
         )
+    yields = any(isinstance(material, YieldingMaterial) for material in materials)
+    if yields != (integration == "bbar"):
+        raise InputError(
+            "assemble: integration='bbar' is for materials that yield, and 'selective' for linear "
+            f"ones: give integration='{'bbar' if yields else 'selective'}'"
+        )
+    if yields:
+        if degree == 2:
+            raise InputError(
+                "assemble: integration='bbar' is for degree=1, as degree=2 does not lock; leave it "
+                "out"
+            )
+        return
     if degree == 2 or isinstance(section, PlaneStress):
         raise InputError(
             "assemble: integration='selective' is for degree=1 in plane strain or in space: "
@@ -312,6 +340,40 @@ def _check_integration(
         raise InputError(
             "assemble: integration='selective' is for LinearElastic materials without KelvinVoigt "
             "damping; take degree=2 for others"
+        )
+
+
+def refuse_in_yielding(forms: Any, loads: Sequence[Any]) -> None:
+    """Raise InputError for forms and loads that do not go with a material that yields.
+
+    Args:
+        forms: the user's own forms, or None.
+        loads: of the body.
+    """
+    if forms is not None:
+        raise InputError(
+            "assemble: forms=… do not go with a material that yields, which states the body by "
+            "itself; give one of the two"
+        )
+    if any(isinstance(load, InitialStrain) for load in loads):
+        raise InputError(
+            "assemble: InitialStrain does not go with a material that yields, whose strain is not "
+            "that of a linear body; leave it out"
+        )
+
+
+def refuse_initial_stress(stress: Any, materials: Sequence[Any]) -> None:
+    """Raise InputError for an initial stress of a body that does not yield, and what is none.
+
+    Args:
+        stress: what was given, or None.
+        materials: those of the body, or its forms.
+    """
+    optional(function, OWNER, "initial_stress", stress, "give a function of points (k, d)")
+    if stress is not None and not any(isinstance(given, YieldingMaterial) for given in materials):
+        raise InputError(
+            "assemble: initial_stress is for materials that yield; give a linear body an "
+            "InitialStrain among its loads"
         )
 
 

@@ -20,6 +20,7 @@ from ...core.errors import InputError
 from ...core.system import SemiDiscreteSystem
 from ...laws.materials import Damping, ElasticValues, LinearElastic, Section
 from ...laws.orthotropic import VOIGT, Orthotropic
+from ...laws.yielding import YieldingMaterial
 from .. import compat
 from ..mesh.tagged_mesh import Cells
 from .dashpots import Dashpots
@@ -27,10 +28,10 @@ from .dilatation import MeanDilatation
 from .heterogeneous import Heterogeneous
 from .space import FemSpace
 
-Material = LinearElastic | Orthotropic | Heterogeneous
+Material = LinearElastic | Orthotropic | Heterogeneous | YieldingMaterial
 Materials = Material | Sequence[tuple[Cells, Material]]
 FIELDS = ("lame", "shear", "rho", "alpha_rho", "beta", "lame_out")
-KINDS = (LinearElastic, Orthotropic, Heterogeneous)
+KINDS = (LinearElastic, Orthotropic, Heterogeneous, YieldingMaterial)
 
 
 class ElasticForms:
@@ -54,6 +55,7 @@ class ElasticForms:
         symmetric: whether all matrices are.
         notes: what comes from where.
         own_damping: whether the user gave a form of C.
+        nonlinear: what is not linear, in words.
     """
 
     boundaries: tuple[Dashpots, ...] = ()  # of the same system
@@ -64,6 +66,7 @@ class ElasticForms:
     symmetric = True
     own_damping = False
     statics_only = False
+    nonlinear = "Forms: internal"  # what is not linear, in words, where ``internal`` is there
     notes: tuple[str, ...] = ()
 
     def __init__(

@@ -20,6 +20,7 @@ import numpy as np
 from ...core.algebra import Array, Mask, from_each, largest, max_abs
 from ...core.checks import several
 from ...core.errors import InputError
+from ...core.internal import remembers
 from ...core.problem import ContactProblem
 from ...core.state_checks import check_problem_given, check_sizes
 from ...core.step import State
@@ -56,6 +57,11 @@ def release(
     stages = several("release", "earlier", earlier, "give a list of problems, or leave it out")
     for given in (static, problem, *stages):
         check_problem_given("release", given)
+        if remembers(given.system.internal):
+            raise InputError(
+                "release: the body yields, and its stresses cannot go on in another problem yet: "
+                "keep the supports, and hand the state to simulate(state=)"
+            )
     check_sizes("release", static, state)
 
     # where the body is, and that the problem begins there

@@ -40,6 +40,7 @@ LEDGER = (
     ("loss_friction", "friction", "#17a2b8", (0, (4, 1, 1, 1, 1, 1))),
     ("loss_impact", "impact loss", "#2a7d2a", (0, (2, 2))),
     ("loss_algorithmic", "algorithmic", "#8c6d5f", ":"),
+    ("loss_plastic", "yielding", "#d1495b", (0, (5, 2, 1, 2))),
 )
 
 

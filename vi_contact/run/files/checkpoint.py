@@ -9,6 +9,9 @@ They hold the state of a run in numbers that do not depend on the ranks that go 
 - ``r_n``, ``active`` and with friction ``r_t``, a row for each condition of all ranks, in the order
   of ``surface.slots``;
 - arrays of a joint in the memory (``memory_joint_…``), likewise;
+- arrays of cells, which materials that yield remember, (cells of all ranks, …), in the order of the
+  numbers of the cells in the mesh file; with the middle of each cell (``cells_…``), which must be
+  that of the mesh that goes on;
 - other arrays of the memory, which are the same on every rank;
 - ``about``, a text in JSON: t, k, the base steps done, what problem it is of (``identify``), the
   checksum of the histories, and the number of the format;
@@ -36,10 +39,11 @@ from typing import Any
 import numpy as np
 from numpy.lib import format as npy
 
-from ...core.algebra import largest
-from ...core.checks import array, number, quote, whole
+from ...core.algebra import largest, max_abs
+from ...core.checks import array, number, quote, refuse, whole
 from ...core.errors import InputError, is_of_machine
 from ...core.files import on_root, write_atomically
+from ...core.internal import MATERIAL, remembers, select_memory
 from ...core.joints import MEMORY as JOINT
 from ...core.own_files import is_own, open_to_read
 from ...core.problem import ContactProblem
@@ -53,6 +57,8 @@ Arrays = dict[str, Any]
 STATES = 2  # the number of the format of checkpoints, and that of version 0.2
 OLD_STATES = 1
 MEMORY = "memory_"  # how names of arrays of the scheme's memory begin
+MIDDLES = "cells_"  # how names of the middles of cells begin
+SAME_PLACE = 1e-9  # of the largest coordinate: how far cells may be from where they were
 CONTACT = ("r_n", "active", "r_t")  # arrays of the conditions
 LONGEST = 200  # characters of a foreign reason
 # what a damaged archive makes the readers of zip, numpy and json raise
@@ -122,8 +128,10 @@ def write_checkpoint(
     """
     # Rank 0 gets the vectors of all ranks, with the numbers of their unknowns, and whole arrays.
     state = place.state
-    vectors, arrays_of_root = _split(problem, state)
-    gathered = problem.system.algebra.comm.gather((problem.system.space.ids, vectors))
+    vectors, cells, arrays_of_root = _split(problem, state)
+    comm = problem.system.algebra.comm
+    gathered = comm.gather((problem.system.space.ids, vectors))
+    gathered_cells = {name: comm.gather(rows) for name, rows in cells.items()}
     # json keeps floats to the last bit
     about = json.dumps(
         {
@@ -131,6 +139,7 @@ def write_checkpoint(
             **run_of,
             "rows": rows,
             "vectors": sorted(vectors),
+            **({"cells": sorted(cells)} if cells else {}),
             "t": state.t,
             "k": state.k,
             "t_start": place.t_start,
@@ -149,6 +158,10 @@ def write_checkpoint(
         arrays = dict(arrays_of_root)
         for name in vectors:
             arrays[name] = np.concatenate([own[name] for _, own in parts])[order]
+        for name, of_ranks in gathered_cells.items():
+            columns = zip(*(of_ranks or []), strict=True)
+            numbers, rows = (np.concatenate(column) for column in columns)
+            arrays[name] = rows[np.argsort(numbers)]
         arrays["about"] = np.array(about)
         buffer = io.BytesIO()
         np.savez(buffer, checksum=np.array(compute_checksum(arrays)), **arrays)
@@ -172,12 +185,13 @@ def read_state_checksum(folder: Path) -> str:
     return compute_checksum(_unpack(folder / CHECKPOINT)[1])
 
 
-def _split(problem: ContactProblem, state: State) -> tuple[Arrays, Arrays]:
-    """Return the arrays of a state in two kinds. Collective.
+def _split(problem: ContactProblem, state: State) -> tuple[Arrays, Arrays, Arrays]:
+    """Return the arrays of a state in three kinds. Collective.
 
     Returns:
-        Those with an entry for each unknown of this rank: u, v, vectors of the memory; and those
-        that are whole on rank 0: of the contact conditions, and the rest of the memory.
+        Those with an entry for each unknown of this rank: u, v, vectors of the memory; those with a
+        row for each cell of this rank, beside the numbers of these; and those that are whole on
+        rank 0: of the contact conditions, and the rest of the memory.
     """
     comm = problem.system.algebra.comm
     vectors: Arrays = {"u": state.u, "v": state.v}
@@ -185,7 +199,15 @@ def _split(problem: ContactProblem, state: State) -> tuple[Arrays, Arrays]:
     if state.r_t is not None:
         contact["r_t"] = state.r_t
     whole = {name: problem.surface.on_first(values) for name, values in contact.items()}
+    cells: Arrays = {}
+    internal: Any = problem.system.internal
+    for name in select_memory(state.memory):
+        numbers = internal.find_cells(name)
+        cells[f"{MEMORY}{name}"] = (numbers, np.asarray(state.memory[name]))
+        cells[f"{MIDDLES}{_find_group(name)}"] = (numbers, internal.find_middles(name))
     for name in sorted(state.memory):
+        if name.startswith(MATERIAL):
+            continue
         values = np.asarray(state.memory[name])
         # On one rank alone an array may have as many entries as there are unknowns by chance.
         if name.startswith(JOINT):
@@ -194,7 +216,12 @@ def _split(problem: ContactProblem, state: State) -> tuple[Arrays, Arrays]:
         is_whole = largest(comm, values.shape != state.u.shape)
         kind = whole if is_whole else vectors
         kind[f"{MEMORY}{name}"] = values
-    return vectors, whole
+    return vectors, cells, whole
+
+
+def _find_group(name: str) -> str:
+    """Return how the names of the arrays of the same cells begin: "material_0_sigma" -> "0"."""
+    return name.removeprefix(MATERIAL).split("_", 1)[0]
 
 
 def read_checkpoint(
@@ -223,14 +250,19 @@ def read_checkpoint(
     about, whole = (None, None) if content is None else content
     about = comm.bcast(about)
     changes = _compare(file, problem, scheme, dt, about, changed)
-    arrays: Arrays = {"r_t": None} | _send_rows(problem, about["vectors"], whole)
+    arrays: Arrays = {"r_t": None} | _send_rows(
+        problem, about["vectors"], about.get("cells", []), whole
+    )
 
-    # What a scheme keeps in mind was made of the matrices and loads of its own problem.
+    # What a scheme keeps in mind was made of the matrices and loads of its own problem. What
+    # materials remember is a part of the body, as its displacement is.
     memory = {}
     for name, values in arrays.items():
-        of_joint = name.startswith(MEMORY + JOINT)
-        if name.startswith(MEMORY) and (of_joint or not changes):
-            memory[name.removeprefix(MEMORY)] = values
+        own = name.removeprefix(MEMORY)
+        of_body = own.startswith((JOINT, MATERIAL))
+        if name.startswith(MEMORY) and (of_body or not changes):
+            memory[own] = values
+    _check_cells(file, problem, arrays, memory)
     state = State(
         about["t"],
         about["k"],
@@ -243,7 +275,38 @@ def read_checkpoint(
     return place, about["rows"]
 
 
-def _send_rows(problem: ContactProblem, vectors: list[str], whole: Arrays | None) -> Arrays:
+def _check_cells(
+    file: Path, problem: ContactProblem, arrays: Arrays, memory: Mapping[str, Any]
+) -> None:
+    """Raise InputError, on all ranks, for what materials of this problem cannot go on from.
+
+    Args:
+        file: the checkpoint.
+        problem: of this run.
+        arrays: of the checkpoint, on this rank.
+        memory: of the state.
+    """
+    internal: Any = problem.system.internal
+    found = select_memory(memory)
+    if not found and not remembers(internal):
+        return
+    fits = remembers(internal) and internal.fits(found)
+    for name in found if fits else ():
+        middles = internal.find_middles(name)
+        size = max_abs(middles)
+        apart = arrays[f"{MIDDLES}{_find_group(name)}"] - middles
+        fits = fits and max_abs(apart) <= SAME_PLACE * size
+    comm = problem.system.algebra.comm
+    defect = (
+        f"the checkpoint '{file}' remembers other materials, or cells at other places: restart it "
+        "with the same mesh and the same materials that yield"
+    )
+    refuse([] if fits else [defect], comm)
+
+
+def _send_rows(
+    problem: ContactProblem, vectors: list[str], cells: list[str], whole: Arrays | None
+) -> Arrays:
     """Return this rank's rows of arrays that rank 0 has as a whole. Collective.
 
     They are sent in one message for each rank, so that rank 0 alone holds the whole.
@@ -251,12 +314,14 @@ def _send_rows(problem: ContactProblem, vectors: list[str], whole: Arrays | None
     Args:
         problem: whose unknowns and conditions the ranks have.
         vectors: names of arrays with a row for each unknown.
+        cells: names of arrays with a row for each cell of a material.
         whole: all arrays, on rank 0 only; those of CONTACT and of joints have a row for each
             condition, and each rank gets the others as they are.
     """
     comm = problem.system.algebra.comm
     parts = comm.gather((problem.system.space.ids, problem.surface.slots)) or [((), ())] * comm.size
     all_ids = np.sort(np.concatenate([ids for ids, _ in parts]))
+    numbers = {name: comm.gather(_find_numbers(problem, name)) for name in cells}
     own: Arrays = {}
     for rank, (ids, slots) in enumerate(parts):
         # Which rows this rank has of each array; ... takes all of those that ranks have alike.
@@ -264,11 +329,24 @@ def _send_rows(problem: ContactProblem, vectors: list[str], whole: Arrays | None
         rows |= dict.fromkeys(CONTACT, slots)
         of_joints = [name for name in whole or {} if name.startswith(MEMORY + JOINT)]
         rows |= dict.fromkeys(of_joints, slots)
+        for name, of_ranks in numbers.items():
+            if of_ranks is not None:
+                known = np.sort(np.concatenate(of_ranks))
+                rows[name] = np.searchsorted(known, of_ranks[rank])
         message = {name: values[rows.get(name, ...)] for name, values in (whole or {}).items()}
         message = comm.bcast(message)
         if rank == comm.rank:
             own = message
     return own
+
+
+def _find_numbers(problem: ContactProblem, name: str) -> Any:
+    """Return the numbers of this rank's cells of an array; none where no material has it."""
+    internal: Any = problem.system.internal
+    own = name.removeprefix(MEMORY).removeprefix(MIDDLES)
+    own = own if own.startswith(MATERIAL) else f"{MATERIAL}{own}_"
+    none = np.zeros(0, dtype=np.int64)
+    return internal.find_cells(own) if remembers(internal) else none
 
 
 def _compare(

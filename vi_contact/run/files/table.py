@@ -32,8 +32,11 @@ LEDGER = {
     "loss_friction": "friction work",
     "loss_impact": "impact loss",
     "loss_algorithmic": "algorithmic loss",
+    "loss_plastic": "work of yielding",
     "energy_defect": "defect",
 }
+
+LOSSES = [name for name in LEDGER if name.startswith("loss_") and name != "loss_plastic"]
 
 # Shares with friction, nan while open: column -> their name in the summary.
 SHARES = {"friction_used": "friction_used", "contact_slipping": "slipping"}
@@ -292,7 +295,8 @@ class Tally:
             self._take_largest("energy", rows["energy_kinetic"] + rows["energy_strain"])
             self._take_largest("work", np.abs(rows["work_input"]))
             self._take_largest("defect", np.abs(rows["energy_defect"]))
-            losses = sum(rows[name] for name in LEDGER if name.startswith("loss_"))
+            # what yielding takes hides nothing that the scheme creates
+            losses = sum(rows[name] for name in LOSSES if name in rows)
             self._take_largest("created", -np.asarray(losses))
 
     def _add_to_sum(self, name: str, values: Array) -> None:
@@ -353,7 +357,7 @@ class Tally:
         energy = {
             "energy_start": start,
             "energy_max": most["energy"],
-            **{name: last[name] for name in LEDGER if name != "energy_defect"},
+            **{name: last[name] for name in LEDGER if name in last and name != "energy_defect"},
             "energy_defect_joule": last["energy_defect"],
             "energy_defect": relative,
         }

@@ -5,6 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from ...core.internal import remembers
 from ...core.ledger import Energies, compute_energies, energy_balance
 from ...core.problem import ContactProblem
 from ...core.step import Columns, Report, Row, State
@@ -24,7 +25,8 @@ class Energy:
     store by themselves: their pull -K U is a load. D_impact = ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ with its sign.
     W_input is the work of loads, inertia loads -M r a_g and prescribed motions. The defect is the
     summed work of the residual of the equation of motion; ``summary.json`` has its size over the
-    largest energy or work. Each step costs three products, and damping and impacts cost one more
+    largest energy or work. A body that yields has D_plastic >= 0 too, and E counts what hardening
+    stores. Each step costs three products, and damping and impacts cost one more
     each.
     """
 
@@ -39,11 +41,13 @@ class Energy:
         "loss_algorithmic": ("J", "numerical dissipation of the time scheme since the start"),
         "energy_defect": ("J", "what the ledger cannot explain since the start"),
     }
-    _SUMS = tuple(_COLUMNS)[2:]
+    _PLASTIC: ClassVar[Columns] = {
+        "loss_plastic": ("J", "work dissipated where materials yield since the start"),
+    }
 
     def columns(self) -> Columns:
         """Name energy_kinetic, energy_strain, work_input, loss_*, energy_defect."""
-        return self._COLUMNS
+        return {**self._COLUMNS, **self._PLASTIC} if self._yields else self._COLUMNS
 
     def start(
         self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
@@ -58,11 +62,14 @@ class Energy:
             resumed: the last row of the run that is continued, None for a new run.
         """
         self._problem = problem
-        self._now = compute_energies(problem.equations, state.u, state.v)
+        self._yields = remembers(problem.system.internal)
+        standing = problem.standing_at(state)
+        self._now = compute_energies(standing.equations, state.u, state.v)
         self._stored = self._compute_stored(state)
-        self._sums = dict.fromkeys(self._SUMS, 0.0)
+        sums = tuple(self.columns())[2:]
+        self._sums = dict.fromkeys(sums, 0.0)
         if resumed is not None:
-            self._sums = {term: float(resumed[term]) for term in self._SUMS}
+            self._sums = {term: float(resumed[term]) for term in sums}
         return self._row()
 
     def _row(self) -> Row:
@@ -82,7 +89,8 @@ class Energy:
 
     def row(self, report: Report) -> Row:
         """Return the row of the step that ``report`` tells of."""
-        system = self._problem.equations
+        problem = report.problem
+        system = problem.equations
         new = report.new
         end = new if new.v is report.v_minus else new.with_velocity(report.v_minus)
         with np.errstate(over="ignore", invalid="ignore"):  # the session refuses overflow
@@ -91,7 +99,7 @@ class Energy:
                 system, new.u, report.v_minus, momentum=report.momentum, elastic=report.elastic
             )
             step = energy_balance(
-                self._problem, report.old, end, report.balance, before=self._now, after=free
+                problem, report.old, end, report.balance, before=self._now, after=free
             )
             # The impact law changes velocities, and so the kinetic energy alone.
             self._now = free
@@ -103,15 +111,16 @@ class Energy:
         # Rates of initial strains do the work by which the energy they store has grown.
         before = self._stored
         self._stored = self._compute_stored(new)
-        losses = (
-            step.input + (self._stored - before),
-            step.damping,
-            step.contact,
-            step.friction,
-            free.kinetic - self._now.kinetic,
-            step.algorithmic,
-            step.defect,
-        )
-        for term, loss in zip(self._SUMS, losses, strict=True):
-            self._sums[term] += loss
+        losses = {
+            "work_input": step.input + (self._stored - before),
+            "loss_damping": step.damping,
+            "loss_contact": step.contact,
+            "loss_friction": step.friction,
+            "loss_impact": free.kinetic - self._now.kinetic,
+            "loss_algorithmic": step.algorithmic,
+            "energy_defect": step.defect,
+            "loss_plastic": step.plastic,
+        }
+        for term in self._sums:
+            self._sums[term] += losses[term]
         return self._row()

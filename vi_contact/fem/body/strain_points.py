@@ -1,0 +1,169 @@
+"""Compute strains at the points of integration of all cells, and forces and matrices from there.
+
+    eps = B u,    p = ∑ w Bᵀ sigma,    K = ∑ w Bᵀ D B
+
+B (n, k) has a row for each component in Mandel's notation (``laws.mandel``) and a column for each
+component of the nodes of a cell; w is weight, Jacobian and thickness. Materials that yield are
+numpy and not forms, so that B is tabulated once here and no compiler runs.
+
+With the mean dilatation (B-bar), tr eps of every point is the mean of its cell: first-order cells
+then do not lock where the flow keeps the volume (Hughes, Int. J. Numer. Methods Eng. 15 (1980),
+1413-1418).
+
+Each rank has its owned cells. Displacements come with ghosts, and forces on ghosts go to their
+owners; nothing else is sent.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from ...core.algebra import Array, Indices
+from ...laws.mandel import PAIRS, ROOT
+from .. import compat
+from .cell_matrices import CellMatrices
+from .space import FemSpace
+
+
+class StrainPoints:
+    """Hold B at the points of integration of the owned cells.
+
+    Attributes:
+        cells: how many cells this rank owns.
+        each: points in a cell.
+        components: n, 4 in plane strain and 6 in space.
+        weights: (cells, each) of the points [m³], or [m²] times the thickness.
+        places: (cells, each, d) of the points [m].
+    """
+
+    def __init__(
+        self,
+        space: FemSpace,
+        thickness: float,
+        *,
+        degree: int | None = None,
+        mean_dilatation: bool = False,
+    ) -> None:
+        """Tabulate B. Collective.
+
+        Args:
+            space: the body's unknowns.
+            thickness: of the section [m].
+            degree: of the quadrature; None for that which is exact on cells with parallel sides.
+            mean_dilatation: whether tr eps is the mean of its cell.
+        """
+        mesh = space.mesh
+        d = space.dimension
+        simplex = compat.is_simplex(mesh)
+        if degree is None:
+            degree = 2 * (space.degree - 1) if simplex else 2 * space.degree
+        X, w = compat.make_quadrature(mesh, degree)
+        self._space = space
+        self.cells = mesh.topology.index_map(mesh.topology.dim).size_local
+        self.each = len(w)
+        self.components = 4 if d == 2 else 6
+
+        # Places and Jacobians of the points, by the shape functions of the mesh.
+        geometry = compat.geometry_dofmap(mesh)[: self.cells]
+        nodes = mesh.geometry.x[geometry][:, :, :d]
+        shapes, slopes = compat.tabulate(mesh, nodes.shape[1], X)
+        self.places: Array = np.einsum("qn,cni->cqi", shapes, nodes)
+        jacobians = np.einsum("kqn,cni->cqik", slopes, nodes)
+        self.weights: Array = thickness * w * np.abs(np.linalg.det(jacobians))
+
+        # Gradients of the shape functions of the displacement, and rows of B.
+        blocks = compat.cell_blocks(space.V)[: self.cells]
+        _, slopes = compat.tabulate(mesh, blocks.shape[1], X)
+        gradients = np.einsum("kqn,cqki->cqni", slopes, np.linalg.inv(jacobians))
+        self._B = _make_rows(gradients, self.components)
+        if mean_dilatation:
+            _take_mean_dilatation(self._B, self.weights)
+        self._B = self._B.reshape(self.cells, self.each * self.components, -1)
+        self._dofs: Indices = (blocks[:, :, None] * d + np.arange(d)).reshape(self.cells, -1)
+        self._field = compat.function(space.V)
+        self._free: CellMatrices | None = None
+
+    @property
+    def bytes(self) -> int:
+        """Return the bytes of B, its weights and numbers on this rank."""
+        return self._B.nbytes + self.weights.nbytes + self._dofs.nbytes + self.places.nbytes
+
+    def strain(self, u: Array) -> Array:
+        """Return eps (points, n) of free unknowns (n,) [m]. Collective."""
+        full = self._space.expand(u, 0.0)  # nothing that is held moves: any time will do
+        values = self._field.x.array
+        values[: full.size] = full.ravel()
+        self._field.x.scatter_forward()
+        own = values[self._dofs][:, :, None]
+        return np.matmul(self._B, own).reshape(-1, self.components)
+
+    def force(self, sigma: Array) -> Array:
+        """Return p (n,) [N] of stresses (points, n) [Pa]. Collective."""
+        weighted = (self.weights.reshape(-1, 1) * sigma).reshape(self.cells, 1, -1)
+        own = np.matmul(weighted, self._B).reshape(self.cells, -1)
+        values = self._field.x.array
+        values[:] = np.bincount(self._dofs.ravel(), own.ravel(), len(values))
+        compat.add_to_owners(self._field)
+        owned = len(self._space.nodes) * self._space.dimension
+        return self._space.pull(np.array(values[:owned]))
+
+    def free_matrix(self, D: Array) -> Any:
+        """Return K of the free unknowns of tangents D (points, n, n) [Pa]. Collective."""
+        if self._free is None:
+            self._free = CellMatrices(
+                self._dofs,
+                self._spread(self._space.numbers),
+                int(self._space.free.sum()),
+                self._space.comm,
+            )
+        return self._free.add_up(self._make_matrices(D))
+
+    def full_matrix(self, D: Array) -> Any:
+        """Return K of all components, before elimination, of tangents D [Pa]. Collective."""
+        index_map = self._space.V.dofmap.index_map
+        d = self._space.dimension
+        first = index_map.local_range[0] * d
+        owned = index_map.size_local * d
+        numbers = self._spread(first + np.arange(owned))
+        return CellMatrices(self._dofs, numbers, owned, self._space.comm).add_up(
+            self._make_matrices(D)
+        )
+
+    def _spread(self, numbers: Indices) -> Indices:
+        """Return the numbers of all local components, of those of the owned ones. Collective."""
+        values = self._field.x.array
+        values[: numbers.size] = numbers.ravel()
+        self._field.x.scatter_forward()
+        return np.rint(values).astype(np.int64)
+
+    def _make_matrices(self, D: Array) -> Array:
+        """Return ∑ w Bᵀ D B (cells, k, k) of tangents (points, n, n)."""
+        n = self.components
+        B = self._B.reshape(self.cells, self.each, n, -1)
+        weighted = D.reshape(self.cells, self.each, n, n) * self.weights[:, :, None, None]
+        DB = np.matmul(weighted, B).reshape(self.cells, self.each * n, -1)
+        return np.matmul(self._B.swapaxes(1, 2), DB)
+
+
+def _make_rows(gradients: Array, n: int) -> Array:
+    """Return B (cells, points, n, nodes, d) of the gradients (cells, points, nodes, d)."""
+    cells, each, nodes, d = gradients.shape
+    B = np.zeros((cells, each, n, nodes, d))
+    for i in range(d):
+        B[:, :, i, :, i] = gradients[..., i]
+    for place, (i, j) in enumerate(PAIRS[n]):
+        B[:, :, 3 + place, :, i] = gradients[..., j] / ROOT
+        B[:, :, 3 + place, :, j] = gradients[..., i] / ROOT
+    return B
+
+
+def _take_mean_dilatation(B: Array, weights: Array) -> None:
+    """Replace tr eps of every point by the mean of its cell, in place.
+
+    Args:
+        B: rows (cells, points, n, nodes, d).
+        weights: (cells, points).
+    """
+    trace = B[:, :, :3].sum(axis=2)
+    mean = np.einsum("cq,cqnd->cnd", weights, trace) / weights.sum(axis=1)[:, None, None]
+    B[:, :, :3] += ((mean[:, None] - trace) / 3.0)[:, :, None]

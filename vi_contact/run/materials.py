@@ -1,0 +1,66 @@
+"""Carry what materials remember from state to state, and certify it: for bodies that yield.
+
+Every function returns what it was given where materials have no memory.
+"""
+
+from dataclasses import replace
+from typing import Any
+
+from ..core.certificate import Certificate
+from ..core.errors import StepFailure
+from ..core.internal import remembers, select_memory
+from ..core.problem import ContactProblem
+from ..core.step import State
+from ..core.system import SemiDiscreteSystem
+
+
+def keep_material(problem: ContactProblem, old: State, new: State) -> State:
+    """Return a state with what materials remember in another one: schemes make memory anew.
+
+    Args:
+        problem: whose state it is.
+        old: that remembers.
+        new: at the same place.
+    """
+    if not remembers(problem.system.internal):
+        return new
+    return replace(new, memory={**new.memory, **select_memory(old.memory)})
+
+
+def remember_material(system: SemiDiscreteSystem, state: State) -> State:
+    """Return the state at the end of a step with what materials remember there. Collective.
+
+    Args:
+        system: the equations, whose materials stand at the beginning of the step.
+        state: at its end.
+    """
+    internal: Any = system.internal
+    if not remembers(internal):
+        return state
+    return replace(state, memory={**state.memory, **internal.remember(state.u)})
+
+
+def certify_material(
+    system: SemiDiscreteSystem, certificate: Certificate, state: State, tolerance: float
+) -> Certificate:
+    """Return the certificate with the residual of the laws of materials. Collective.
+
+    Args:
+        system: the equations, whose materials stand at the beginning of the step.
+        certificate: of the step without it.
+        state: at the end of the step.
+        tolerance: the largest residual.
+
+    Raises:
+        StepFailure: the residual is above the tolerance.
+    """
+    internal: Any = system.internal
+    if not remembers(internal):
+        return certificate
+    whole = replace(certificate, material=internal.residual(state.u))
+    if not whole.worst <= tolerance:
+        raise StepFailure(
+            f"step {state.k} at t = {state.t:.6g} s: the law of a material is not satisfied to the "
+            f"certificate tolerance {tolerance:g} ({whole}): check stress and f of the material"
+        )
+    return whole
