@@ -82,6 +82,8 @@ class Stage:
         old: (share u0, share p(u0)) where the displacement of the stage is a sum share u0 + x over
             both ends, at each of which the internal force p of a body that is not linear is taken.
         of_momentum: whether the mean acceleration of the step is (v1 - v0)/dt.
+        between: u0 (n,) where the internal force is that of both ends at once, p̄(u0, x), of a body
+            that turns (``core.internal.TwoEndForce``); x is then the displacement at the end.
     """
 
     guess: Array
@@ -101,6 +103,7 @@ class Stage:
     before: Callable[[], Balance] | None = None
     old: tuple[Array, Array] | None = None
     of_momentum: bool = True
+    between: Array | None = None
 
     def find_internal(self, system: SemiDiscreteSystem, d: Array | None = None) -> Array:
         """Return the internal force (n,) [N] of the balance at an increment; None for zero.
@@ -112,8 +115,24 @@ class Stage:
             system: the equations that are marched.
             d: the increment (n,); None for zero.
         """
+        if self.between is not None:
+            both: Any = system.internal
+            return np.asarray(both.between(self.between, self.find_place(d)))
         internal = system.internal_force(self.find_place(d))
         return internal if self.old is None else self.old[1] + internal
+
+    def find_tangent(self, system: SemiDiscreteSystem, d: Array) -> Matrix:
+        """Return the tangent (n, n) [N/m] of the internal force at the displacement of the stage.
+
+        Args:
+            system: the equations that are marched.
+            d: the increment (n,).
+        """
+        internal: Any = system.internal
+        place = self.find_place(d)
+        if self.between is not None:
+            return internal.between_tangent(self.between, place)  # type: ignore[no-any-return]
+        return internal.tangent(place)  # type: ignore[no-any-return]
 
     def find_place(self, d: Array | None = None) -> Array:
         """Return the displacement (n,) [m] at which the internal force is asked for.
@@ -121,6 +140,8 @@ class Stage:
         Args:
             d: the increment (n,); None for zero.
         """
+        if self.between is not None:
+            return self.guess if d is None else self.guess + d
         u: Any = self.u.at_guess if d is None else self.u(d)
         return u if self.old is None else u - self.old[0]
 

@@ -28,7 +28,7 @@ from .algebra import (
 from .checks import array, function, instance, provides, quote, several
 from .collective import keep_error
 from .errors import InputError
-from .internal import InternalForce, InTurnedUnknowns
+from .internal import InternalForce, in_unknowns
 
 
 class Companion(Protocol):
@@ -466,7 +466,7 @@ class SemiDiscreteSystem:
             u0=inverse(self.u0),
             v0=inverse(self.v0),
             internal=(
-                None if self.internal is None else InTurnedUnknowns(self.internal, T, self.algebra)
+                None if self.internal is None else in_unknowns(self.internal, T, self.algebra)
             ),
         )
 

@@ -103,6 +103,7 @@ def position_stage(
     before: Callable[[], Balance] | None = None,
     old: tuple[float, Array] | None = None,
     of_momentum: bool = True,
+    between: Array | None = None,
 ) -> Stage:
     """Return the stage of a step in x = u1, with gap and slip at the end of the step.
 
@@ -123,6 +124,7 @@ def position_stage(
         old: (share, u0) where u is a sum share u0 + u1 over both ends; None where it is no such
             sum.
         of_momentum: whether the mean acceleration of the step is (v1 - v0)/dt.
+        between: u0 (n,) where the internal force of a body that turns is that of both ends.
 
     Returns:
         The stage: bound is the gap (m,) [m] of the undeformed body at the end, slip is measured
@@ -151,6 +153,7 @@ def position_stage(
         before=before,
         old=of_start,
         of_momentum=of_momentum,
+        between=between,
     )
 
 

@@ -214,6 +214,8 @@ class NonlinearSolver:
         whole = pose(self._problem, stage, self.A, self._system)
         start = Place(whole.guess, whole.b, whole.active)
         walk = Walk(stage, whole, start, start, self._reference, self._make_acceleration())
+        # The reference of a body that has turned is of no use: its passes go with a tangent.
+        walk.tangent_due = stage.between is not None
         if whole.internal is not None and not self._is_finite(whole.internal):
             raise StepFailure(
                 f"{_name(walk)} begins where its internal force is NaN or infinite: {self._advice}"
@@ -255,11 +257,9 @@ class NonlinearSolver:
     def _take_tangent(self, walk: Walk) -> None:
         """Go on with the tangent of where the walk is. Collective."""
         stage = walk.stage
-        internal = self._system.internal
-        assert internal is not None  # linear bodies have no walk
         self.tangents += 1
         walk.solver = self._reference  # the tangent before gives its memory back
-        tangent = internal.tangent(stage.find_place(walk.here.d))
+        tangent = stage.find_tangent(self._system, walk.here.d)
         if walk.care:
             tangent = self._brace(tangent, walk.here.active, SHARES[walk.care])
         walk.solver = self._prepare(stage, make_matrix(self._system, stage, tangent))

@@ -51,12 +51,14 @@ from .dashpots import DashpotMatrix, Dashpots, describe_boundaries
 from .dirichlet import choose_space, read_values, refuse_contradictions, refuse_uneven
 from .elimination import Elimination
 from .forms import ElasticForms, Materials, cell_materials
+from .hyperelastic import TURNING
 from .initial_strains import InitialStrain, InitialStrains
 from .linear_forms import AnyLoad, LinearForm, Loads
 from .loads import BodyForce, Prescribed, Traction, evaluate
 from .own_forms import Forms, OwnForms
 from .space import FemSpace, translations
 from .ties import Tied
+from .turning_forms import TurningForms, refuse_beside_turning
 
 Field = tuple[float, ...] | Callable[[Array], Array]
 Initial = Field | Sequence[tuple[Cells, Field]] | None
@@ -98,7 +100,8 @@ def assemble(
         degree: degree of the displacement in each cell: 1 for P1 or Q1, 2 for P2 or Q2
             (docs/guide/second_order.md).
         material: LinearElastic, Orthotropic or fem.Heterogeneous, or (cells, material) pairs that
-            cover the mesh.
+            cover the mesh. A body that turns is of SaintVenantKirchhoff, NeoHookean or
+            fem.Hyperelastic alone (docs/guide/turning.md).
         forms: the user's own weak forms, ``fem.Forms``; a material beside them gives the density
             where they have no mass, and the wave speeds that dashpots and free fields need. Without
             a mass at all the system is for static stages alone.
@@ -201,7 +204,10 @@ def assemble(
 
     # the body: weak forms of its materials or of the user, absorbing boundaries, loads
     materials = [] if material is None else cell_materials(mesh, material)
-    if forms is None:
+    if forms is None and any(isinstance(given, TURNING) for _, given in materials):
+        refuse_beside_turning(conditions.dashpots, conditions.loads)
+        body = TurningForms(space, materials, section, damping)
+    elif forms is None:
         selective = integration == "selective"
         body = ElasticForms(space, materials, section, damping, selective=selective)
     else:
@@ -259,6 +265,8 @@ def assemble(
         internal=body.internal,
     )
     body.own(system)
+    if isinstance(body, TurningForms):
+        body.check_rest(system.K)
 
     # matrices of all components are large: they go before anything else is made
     del absorbers, reduced

@@ -25,12 +25,13 @@ from ..mesh.tagged_mesh import Cells
 from .dashpots import Dashpots
 from .dilatation import MeanDilatation
 from .heterogeneous import Heterogeneous
+from .hyperelastic import TURNING, TurningMaterial
 from .space import FemSpace
 
-Material = LinearElastic | Orthotropic | Heterogeneous
+Material = LinearElastic | Orthotropic | Heterogeneous | TurningMaterial
 Materials = Material | Sequence[tuple[Cells, Material]]
 FIELDS = ("lame", "shear", "rho", "alpha_rho", "beta", "lame_out")
-KINDS = (LinearElastic, Orthotropic, Heterogeneous)
+KINDS = (LinearElastic, Orthotropic, Heterogeneous, *TURNING)
 
 
 class ElasticForms:

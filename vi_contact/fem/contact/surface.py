@@ -25,6 +25,7 @@ from ...core.checks import array, describe_point, flag, optional, provides, seve
 from ...core.collective import agree
 from ...core.corners import FEATURE_ANGLE, PARALLEL, make_tangent_vectors
 from ...core.errors import InputError
+from ...core.internal import turns
 from ...core.obstacles import Obstacle, Touching, check_gap, locate_obstacle
 from ...core.surfaces import ContactSurface, list_tangential_columns
 from ...core.system import SemiDiscreteSystem
@@ -43,6 +44,7 @@ from .faces import (
     split_at_corners,
     tell_corners,
 )
+from .flat_supports import make_flat_question, refuse_curved, take_boundary
 from .frames import (
     Facing,
     NodalConditions,
@@ -62,7 +64,7 @@ log = logging.getLogger(__name__)
 @report_time("contact")
 def contact_surface(
     system: SemiDiscreteSystem,
-    facets: Facets,
+    facets: Facets | None = None,
     *,
     obstacle: Obstacle | None = None,
     points: Sequence[Sequence[float]] | None = None,
@@ -84,9 +86,13 @@ def contact_surface(
     angle between them (``fem.contact.faces``). Where the obstacle gives all faces of a node one
     direction, as a HalfSpace does, the node has one condition.
 
+    A body that turns (of SaintVenantKirchhoff, for example) may land with any node, on whichever
+    side of it the node lies at the start: all of them have a condition with the flat support, whose
+    normal does not turn (``fem.contact.flat_supports``).
+
     Args:
         system: the system of the body, of ``assemble``.
-        facets: the part of the boundary.
+        facets: the part of the boundary; None: all of the boundary of a body that turns.
         obstacle: Touching() by default, HalfSpace, AnalyticGap or the user's own; it is asked for
             every face of a node.
         points: (k, d) coordinates; each is replaced by the nearest node of the facets. The order is
@@ -99,8 +105,14 @@ def contact_surface(
     Raises:
         InputError: no contact nodes, nodes that only glue two bodies together, a listed point that
             is clamped or not on the facets, a contact direction that is partly prescribed, initial
-            penetration, a node with more faces than the body has dimensions.
+            penetration, a node with more faces than the body has dimensions; another obstacle than
+            a HalfSpace before a body that turns.
     """
+    body_turns = turns(getattr(system, "internal", None))
+    if body_turns:
+        refuse_curved(obstacle)
+    if facets is None:
+        facets = take_boundary(system)
     space = contact_space(
         "contact_surface",
         system,
@@ -135,10 +147,14 @@ def contact_surface(
 
     # one node for each face, the obstacle's answer there, and one condition for each direction
     around = gather_boundary(space, facets, beyond=angle)
-    nodes, _ = split_at_corners(space, around, whole, angle)
+    nodes = whole
+    if not body_turns:
+        nodes, _ = split_at_corners(space, around, whole, angle)
     slots = slots_of(comm, _places(nodes, chosen))
     count = round(total(comm, len(slots)))
     ask = _make_question(obstacle, space.size, facets.name, angle, count)
+    if body_turns:
+        ask = make_flat_question(obstacle, space.size)
     directions, gap = ask_alike(comm, slots, ask, nodes.points, nodes.normals)
     nodes, directions, gap = one_per_direction(whole, nodes, directions, gap)
     nodes, directions, gap = merge_ties(space, facets.name, nodes, directions, gap, angle)
@@ -167,7 +183,7 @@ def contact_surface(
         "tied to another": wanted & ~np.isin(every.numbers, nodes.numbers),
     }
     watched: tuple[Watched, ...] = ()
-    if chosen is None:
+    if chosen is None and not body_turns:
         lost, _ = split_at_corners(space, around, every.pick(held), angle)
         watched = _watch_held(space, facets.name, lost, obstacle)
     kinds["shared with another body"] = hinge
