@@ -9,8 +9,8 @@ stored energy, and it has no moment about the middle places. So in free flight
 
     ½ v1·M v1 + W(u1) = ½ v0·M v0 + W(u0),   Σ m y1 x v1 = Σ m y0 x v0,   y = X + u
 
-to round-off. Of a linear body p̄ = ½ K (u0 + u1), and the scheme is the midpoint rule. In x = u1: A =
-4/dt² M + 2/dt C + K, scale = 2; passes of a step have a tangent in the place of K.
+to round-off. Of a linear body p̄ = ½ K (u0 + u1), and the scheme is the midpoint rule. In x = u1:
+A = 4/dt² M + 2/dt C + K,  scale = 2; passes of a step have a tangent in the place of K.
 
 Order 2, unconditionally stable, no damping of any frequency. A closure loses r̄_n times the gap that
 was closed: contact never creates energy. Contact nodes have their mass, so their forces ring.
@@ -25,6 +25,7 @@ from ..core.internal import turns
 from ..core.problem import ContactProblem
 from ..core.stage import Affine, Answer, Stage
 from ..core.step import State
+from ..laws.mass import ConsistentMass
 from .base import SingleStep, end_state, position_stage
 
 
@@ -40,6 +41,12 @@ class EnergyMomentum(SingleStep):
 
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError for a mass or an internal force that does not turn with the body."""
+        if not isinstance(problem.mass, ConsistentMass):
+            raise InputError(
+                f"EnergyMomentum() does not go with mass={problem.mass}, whose inertia against "
+                "spin changes as the body turns (of a block of 4 x 8 cells by 3.6 % at 90 degrees)"
+                ": give the problem mass=ConsistentMass(), or leave mass= out"
+            )
         super().check(problem)
         internal = problem.equations.internal
         if internal is not None and not turns(internal):

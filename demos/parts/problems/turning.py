@@ -4,8 +4,8 @@
 - ``rock_block``: a block that leans on a corner, and is let go.
 - ``shake_column``: a free-standing column on a ground that moves.
 
-Beside them stands the rigid block (Housner, Bull. Seism. Soc. Am. 53, 1963), at any angle: R is half
-its diagonal, alpha = atan(width/height), p² = 3g/4R, and about its corner
+Beside them stands the rigid block (Housner, Bull. Seism. Soc. Am. 53, 1963), at any angle: R is
+half its diagonal, alpha = atan(width/height), p² = 3g/4R, and about its corner
 
     theta'' = -p² (sin(alpha - theta) - a/g cos(alpha - theta))
 

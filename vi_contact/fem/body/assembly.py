@@ -46,7 +46,7 @@ from .assembly_checks import (
     check_ratios,
     refuse_folded,
 )
-from .conditions import as_tuple, gather_conditions
+from .conditions import Conditions, as_tuple, gather_conditions
 from .dashpots import DashpotMatrix, Dashpots, describe_boundaries
 from .dirichlet import choose_space, read_values, refuse_contradictions, refuse_uneven
 from .elimination import Elimination
@@ -58,7 +58,7 @@ from .loads import BodyForce, Prescribed, Traction, evaluate
 from .own_forms import Forms, OwnForms
 from .space import FemSpace, translations
 from .ties import Tied
-from .turning_forms import TurningForms, refuse_beside_turning
+from .turning_forms import TurningForms
 
 Field = tuple[float, ...] | Callable[[Array], Array]
 Initial = Field | Sequence[tuple[Cells, Field]] | None
@@ -204,12 +204,9 @@ def assemble(
 
     # the body: weak forms of its materials or of the user, absorbing boundaries, loads
     materials = [] if material is None else cell_materials(mesh, material)
-    if forms is None and any(isinstance(given, TURNING) for _, given in materials):
-        refuse_beside_turning(conditions.dashpots, conditions.loads)
-        body = TurningForms(space, materials, section, damping)
-    elif forms is None:
+    if forms is None:
         selective = integration == "selective"
-        body = ElasticForms(space, materials, section, damping, selective=selective)
+        body = _state_body(space, materials, section, damping, conditions, selective=selective)
     else:
         body = OwnForms(space, forms, materials, section, damping)
     body.boundaries = conditions.dashpots
@@ -265,13 +262,35 @@ def assemble(
         internal=body.internal,
     )
     body.own(system)
-    if isinstance(body, TurningForms):
-        body.check_rest(system.K)
 
     # matrices of all components are large: they go before anything else is made
     del absorbers, reduced
     give_back(mesh.comm)
     return system
+
+
+def _state_body(
+    space: FemSpace,
+    materials: list[tuple[Any, Any]],
+    section: Section,
+    damping: Damping,
+    conditions: Conditions,
+    *,
+    selective: bool,
+) -> ElasticForms:
+    """Return the forms of a body of materials, which turns or does not. Collective.
+
+    Args:
+        space: its unknowns.
+        materials: pairs of local cells and a material.
+        section: that of the body.
+        damping: the law of C.
+        conditions: what holds, damps and loads it.
+        selective: whether tr eps is taken as its mean over each cell.
+    """
+    if any(isinstance(given, TURNING) for _, given in materials):
+        return TurningForms(space, materials, section, damping, conditions)
+    return ElasticForms(space, materials, section, damping, selective=selective)
 
 
 def _gather_companions(

@@ -2,20 +2,18 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
 import ufl
 
-from ...core.arguments import check_fields
 from ...core.checks import function
 from ...core.quantities import Unit
-from ...laws.hyperelastic import NeoHookean, Ratio, SaintVenantKirchhoff, Stiffness
-from ...laws.materials import Density, LinearElastic
+from ...laws.hyperelastic import NeoHookean, SaintVenantKirchhoff, TurningLaw
 from .. import compat
 
 
-@dataclass(frozen=True)
-class Hyperelastic:
+@dataclass(frozen=True, kw_only=True)
+class Hyperelastic(TurningLaw):
     """Describe a material of a body that turns by a stored energy of your own.
 
     Attributes:
@@ -27,18 +25,10 @@ class Hyperelastic:
     """
 
     energy: Annotated[Callable[[Any], Any], Unit("J/m³")]
-    E: Stiffness
-    nu: Ratio
-    rho: Density
-    xi: ClassVar[float] = 0.0
-    lame_lambda = LinearElastic.lame_lambda
-    shear_modulus = LinearElastic.shear_modulus
-    c_p = LinearElastic.c_p
-    c_s = LinearElastic.c_s
 
     def __post_init__(self) -> None:
         function("Hyperelastic", "energy", self.energy, "give a function of C that returns W")
-        check_fields(self)
+        super().__post_init__()
 
 
 TurningMaterial = SaintVenantKirchhoff | NeoHookean | Hyperelastic

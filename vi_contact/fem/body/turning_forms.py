@@ -29,10 +29,10 @@ import ufl
 from ...core.algebra import Array, Matrix, largest, max_abs
 from ...core.checks import on_all
 from ...core.errors import InputError
+from ...core.system import SemiDiscreteSystem
 from ...laws.hyperelastic import SaintVenantKirchhoff
 from ...laws.materials import Damping, MassProportional, NoDamping, PlaneStress, Section
 from .. import compat
-from ..matrices.petsc_rows import transfer
 from .forms import ElasticForms
 from .hyperelastic import TURNING, find_energy
 from .initial_strains import InitialStrain
@@ -165,6 +165,7 @@ class TurningForms(ElasticForms):
         materials: list[tuple[Any, Any]],
         section: Section,
         damping: Damping,
+        conditions: Any,
     ) -> None:
         """Compile the forms. Collective.
 
@@ -173,12 +174,15 @@ class TurningForms(ElasticForms):
             materials: pairs of local cells and a material.
             section: that of the body.
             damping: the law of C.
+            conditions: what holds, damps and loads it (``conditions.Conditions``).
 
         Raises:
             InputError: materials that do not turn beside others that do, plane stress, damping
-                that resists rotation, sides that move together, an energy with other constants.
+                that resists rotation, sides that move together, and what else is of the undeformed
+                place alone.
         """
         refuse_with_turning([given for _, given in materials], section, damping, space)
+        refuse_beside_turning(conditions.dashpots, conditions.loads)
         super().__init__(space, materials, section, damping)
         energies = [find_energy(given, space.mesh) for _, given in materials]
         parts = _mark_cells(space, materials)
@@ -195,7 +199,12 @@ class TurningForms(ElasticForms):
             points=1 if quadratic else GAUSS,
         )
 
-    def check_rest(self, K: Matrix) -> None:
+    def own(self, system: SemiDiscreteSystem) -> None:
+        """Remember the matrices of a system, and check the energy by them. Collective."""
+        super().own(system)
+        self._check_rest(system.K)
+
+    def _check_rest(self, K: Matrix) -> None:
         """Raise InputError unless force and stiffness at rest are zero and K. Collective."""
         space = self.space
         rest = np.zeros(len(space.ids))
@@ -206,8 +215,8 @@ class TurningForms(ElasticForms):
         if not max(wrong, force) <= AT_REST * stiff:
             raise InputError(
                 "assemble: the energy of a Hyperelastic material has at C = 1 not the E and nu "
-                f"that are given beside it (its stiffness is off by {wrong / stiff:.2g}, its stress "
-                f"by {force / stiff:.2g} of it): correct one of them"
+                f"that are given beside it, as its stiffness is off by {wrong / stiff:.2g} and its "
+                f"stress by {force / stiff:.2g} of it: correct one of them"
             )
 
     def stresses(self, u: Any) -> tuple[Any, Any]:

@@ -25,7 +25,6 @@ from ...core.checks import array, describe_point, flag, optional, provides, seve
 from ...core.collective import agree
 from ...core.corners import FEATURE_ANGLE, PARALLEL, make_tangent_vectors
 from ...core.errors import InputError
-from ...core.internal import turns
 from ...core.obstacles import Obstacle, Touching, check_gap, locate_obstacle
 from ...core.surfaces import ContactSurface, list_tangential_columns
 from ...core.system import SemiDiscreteSystem
@@ -44,7 +43,7 @@ from .faces import (
     split_at_corners,
     tell_corners,
 )
-from .flat_supports import make_flat_question, refuse_curved, take_boundary
+from .flat_supports import choose_boundary, make_flat_question
 from .frames import (
     Facing,
     NodalConditions,
@@ -108,11 +107,7 @@ def contact_surface(
             penetration, a node with more faces than the body has dimensions; another obstacle than
             a HalfSpace before a body that turns.
     """
-    body_turns = turns(getattr(system, "internal", None))
-    if body_turns:
-        refuse_curved(obstacle)
-    if facets is None:
-        facets = take_boundary(system)
+    facets, body_turns = choose_boundary(system, facets, obstacle)
     space = contact_space(
         "contact_surface",
         system,
@@ -147,14 +142,13 @@ def contact_surface(
 
     # one node for each face, the obstacle's answer there, and one condition for each direction
     around = gather_boundary(space, facets, beyond=angle)
-    nodes = whole
-    if not body_turns:
-        nodes, _ = split_at_corners(space, around, whole, angle)
+    nodes = whole if body_turns else split_at_corners(space, around, whole, angle)[0]
     slots = slots_of(comm, _places(nodes, chosen))
     count = round(total(comm, len(slots)))
-    ask = _make_question(obstacle, space.size, facets.name, angle, count)
     if body_turns:
         ask = make_flat_question(obstacle, space.size)
+    else:
+        ask = _make_question(obstacle, space.size, facets.name, angle, count)
     directions, gap = ask_alike(comm, slots, ask, nodes.points, nodes.normals)
     nodes, directions, gap = one_per_direction(whole, nodes, directions, gap)
     nodes, directions, gap = merge_ties(space, facets.name, nodes, directions, gap, angle)
