@@ -272,3 +272,15 @@ def _stand(
         loads=fem.BodyForce((0.0, -GRAVITY * material.rho)),
         initial_displacement=turn_about(corner, angle),
     )
+
+
+def find_tilts(block: RigidBlock, history: Any) -> np.ndarray:
+    """Return the clockwise turns of the base [rad] of a history.
+
+    Args:
+        block: the block.
+        history: with the displacements of a probe at its corners "left" and "right".
+    """
+    across = block.width + history["u_x_right"] - history["u_x_left"]
+    up = history["u_y_left"] - history["u_y_right"]
+    return np.asarray(np.unwrap(np.arctan2(up, across)))
