@@ -31,6 +31,7 @@ from .laws import Inelastic as Inelastic
 from .laws import KelvinVoigt as KelvinVoigt
 from .laws import LinearElastic as LinearElastic
 from .laws import MassProportional as MassProportional
+from .laws import NeoHookean as NeoHookean
 from .laws import Newton as Newton
 from .laws import NoDamping as NoDamping
 from .laws import Orthotropic as Orthotropic
@@ -40,6 +41,7 @@ from .laws import Rayleigh as Rayleigh
 from .laws import Rectangular as Rectangular
 from .laws import Redistributed as Redistributed
 from .laws import Ricker as Ricker
+from .laws import SaintVenantKirchhoff as SaintVenantKirchhoff
 from .laws import SlipRateCoulomb as SlipRateCoulomb
 from .laws import Solid as Solid
 from .laws import StaticKinetic as StaticKinetic

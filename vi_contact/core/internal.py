@@ -34,6 +34,23 @@ class InternalForce(Protocol):
         """Return p'(u) (n, n) [N/m], with the pattern of K or one inside of it."""
 
 
+class TwoEndForce(InternalForce, Protocol):
+    """Say it of a body that turns, with one internal force of both ends of a step.
+
+    Its work is the change of the stored energy, (u1 - u0)·p̄(u0, u1) = W(u1) - W(u0), and it has
+    neither a resultant nor a moment about the places in the middle of the step.
+    """
+
+    def between(self, u0: Array, u1: Array) -> Array:
+        """Return p̄(u0, u1) (n,) [N]."""
+
+    def between_tangent(self, u0: Array, u1: Array) -> Matrix:
+        """Return about how p̄ changes with ½ (u0 + u1), (n, n) [N/m], symmetric.
+
+        Passes are solved with it. It decides how many there are, and nothing of the answer.
+        """
+
+
 @dataclass(frozen=True)
 class InTurnedUnknowns:
     """Hold an internal force in the unknowns û of u = T û: Tᵀ p(T û), Tᵀ p'(T û) T, W(T û).
@@ -157,6 +174,28 @@ class RememberingInTurnedUnknowns(InTurnedUnknowns):
         return self.internal.residual(self.T @ u)
 
 
+@dataclass(frozen=True)
+class BetweenTurnedUnknowns(InTurnedUnknowns):
+    """Hold the internal force of a body that turns alike: Tᵀ p̄(T û0, T û1)."""
+
+    internal: TwoEndForce
+
+    def between(self, u0: Array, u1: Array) -> Array:
+        """Return Tᵀ p̄(T u0, T u1) (n,) [N]."""
+        return self.T.transpose_apply(self.internal.between(self.T @ u0, self.T @ u1))
+
+    def between_tangent(self, u0: Array, u1: Array) -> Matrix:
+        """Return the derivative in the unknowns û (n, n) [N/m]."""
+        tangent = self.internal.between_tangent(self.T @ u0, self.T @ u1)
+        turned: Any = self.algebra.congruence(self.T, tangent)
+        return turned
+
+
+def turns(internal: InternalForce | None) -> bool:
+    """Tell whether an internal force is that of a body that turns."""
+    return hasattr(internal, "between")
+
+
 def turn_force(
     internal: InternalForce | None, T: Matrix, algebra: Algebra
 ) -> InTurnedUnknowns | None:
@@ -169,5 +208,10 @@ def turn_force(
     """
     if internal is None:
         return None
-    kind = RememberingInTurnedUnknowns if remembers(internal) else InTurnedUnknowns
-    return kind(internal, T, algebra)
+    kind: Any = InTurnedUnknowns
+    if remembers(internal):
+        kind = RememberingInTurnedUnknowns
+    elif turns(internal):
+        kind = BetweenTurnedUnknowns
+    turned: InTurnedUnknowns = kind(internal, T, algebra)
+    return turned

@@ -89,6 +89,8 @@ class Stage:
             taken.
         end: the share of u1 in that sum.
         of_momentum: whether the mean acceleration of the step is (v1 - v0)/dt.
+        between: u0 (n,) where the internal force is that of both ends at once, p̄(u0, x), of a body
+            that turns (``core.internal.TwoEndForce``); x is then the displacement at the end.
     """
 
     guess: Array
@@ -110,6 +112,7 @@ class Stage:
     old: tuple[Array, Array] | None = None
     end: float = 1.0
     of_momentum: bool = True
+    between: Array | None = None
 
     def find_internal(self, system: SemiDiscreteSystem, d: Array | None = None) -> Array:
         """Return the internal force (n,) [N] of the balance at an increment; None for zero.
@@ -121,10 +124,26 @@ class Stage:
             system: the equations that are marched.
             d: the increment (n,); None for zero.
         """
+        if self.between is not None:
+            both: Any = system.internal
+            return np.asarray(both.between(self.between, self.find_place(d)))
         internal = system.internal_force(self.find_place(d))
         if self.old is None:
             return internal
         return self.old[1] + (internal if self.end == 1.0 else self.end * internal)
+
+    def find_tangent(self, system: SemiDiscreteSystem, d: Array) -> Matrix:
+        """Return the tangent (n, n) [N/m] of the internal force at the displacement of the stage.
+
+        Args:
+            system: the equations that are marched.
+            d: the increment (n,).
+        """
+        internal: Any = system.internal
+        place = self.find_place(d)
+        if self.between is not None:
+            return internal.between_tangent(self.between, place)  # type: ignore[no-any-return]
+        return internal.tangent(place)  # type: ignore[no-any-return]
 
     def find_place(self, d: Array | None = None) -> Array:
         """Return the displacement (n,) [m] at which the internal force is asked for.
@@ -132,6 +151,8 @@ class Stage:
         Args:
             d: the increment (n,); None for zero.
         """
+        if self.between is not None:
+            return self.guess if d is None else self.guess + d
         u: Any = self.u.find(d)
         if self.old is None:
             return u
@@ -226,9 +247,7 @@ class NonlinearForces:
 
     def find_tangent(self, d: Array) -> Matrix:
         """Return p'(u) (n, n) [N/m] at an increment (n,)."""
-        internal = self.system.internal
-        assert internal is not None  # linear bodies have no such forces
-        return internal.tangent(self.stage.find_place(d))
+        return self.stage.find_tangent(self.system, d)
 
     def make_matrix(self, tangent: Matrix) -> EffectiveMatrix:
         """Return A of the step with a tangent in the place of K."""

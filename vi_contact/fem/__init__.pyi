@@ -2,6 +2,7 @@ from .body.assembly import assemble as assemble
 from .body.dashpots import CompliantBase as CompliantBase
 from .body.dashpots import Dashpots as Dashpots
 from .body.heterogeneous import Heterogeneous as Heterogeneous
+from .body.hyperelastic import Hyperelastic as Hyperelastic
 from .body.initial_strains import InitialStrain as InitialStrain
 from .body.linear_forms import LinearForm as LinearForm
 from .body.loads import BodyForce as BodyForce

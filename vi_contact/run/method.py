@@ -14,11 +14,12 @@ from ..core.algebra import from_each, max_abs
 from ..core.checks import describe_point, provides, quote, real, several
 from ..core.collective import Parts, agree, together
 from ..core.errors import InputError
-from ..core.internal import remembers
+from ..core.internal import remembers, turns
 from ..core.problem import ContactProblem
 from ..core.state_checks import check_problem_given, check_sizes, read_start_time
 from ..core.step import Scheme, Solver, State
 from ..laws.mass import ConsistentMass
+from ..schemes.energy_momentum import EnergyMomentum
 from ..schemes.trapezoidal import Trapezoidal
 from ..schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from ..solvers.automatic import Automatic
@@ -134,8 +135,9 @@ def with_defaults(
 
     Without a scheme: the trapezoidal rule on redistributed mass; with an impact law, with mass at
     the contact nodes asked for, with a joint, or of a body that is not linear, the
-    Zienkiewicz-Wood-Taylor step at phi = ½, which never gains energy of a linear body. Without a
-    mass: the scheme's, and the consistent one of a body that is not linear.
+    Zienkiewicz-Wood-Taylor step at phi = ½, which never gains energy of a linear body;
+    EnergyMomentum of a body that turns. Without a mass: the scheme's, and the consistent one of a
+    body that is not linear.
 
     Args:
         problem: what is marched.
@@ -146,6 +148,8 @@ def with_defaults(
     for other in several("march", "others", others, "give a list of problems, or leave it out"):
         check_problem_given("march", other)
     curved = problem.system.internal is not None
+    if scheme is None and turns(problem.system.internal):
+        scheme = EnergyMomentum()
     if scheme is None:
         massive = isinstance(problem.mass, ConsistentMass) or problem.joint is not None
         if problem.impact is None and not (curved or massive):
@@ -155,6 +159,11 @@ def with_defaults(
     provides(
         "march", "scheme", scheme, SCHEME, "give a time scheme, such as Trapezoidal(), or None"
     )
+    if turns(problem.system.internal) and not getattr(scheme, "for_turning", False):
+        raise InputError(
+            f"march: {type(scheme).__name__} gains energy without bound where bodies turn: give "
+            "EnergyMomentum(), or None"
+        )
     if problem.mass is None:
         problem = replace(problem, mass=ConsistentMass() if curved else scheme.mass)
     for other in others:

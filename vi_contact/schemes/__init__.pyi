@@ -1,4 +1,5 @@
 from .contact_stabilised import ContactStabilisedNewmark as ContactStabilisedNewmark
+from .energy_momentum import EnergyMomentum as EnergyMomentum
 from .generalised_alpha import GeneralisedAlpha as GeneralisedAlpha
 from .hht import HHT as HHT
 from .houbolt import Houbolt as Houbolt

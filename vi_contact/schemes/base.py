@@ -121,6 +121,7 @@ def position_stage(
     old: tuple[float, Array] | None = None,
     end: float = 1.0,
     of_momentum: bool = True,
+    between: Array | None = None,
 ) -> Stage:
     """Return the stage of a step in x = u1, with gap and slip at the end of the step.
 
@@ -143,6 +144,7 @@ def position_stage(
             such sum.
         end: the share of u1 in that sum.
         of_momentum: whether the mean acceleration of the step is (v1 - v0)/dt.
+        between: u0 (n,) where the internal force of a body that turns is that of both ends.
 
     Returns:
         The stage: bound is the gap (m,) [m] of the undeformed body at the end, slip is measured
@@ -173,6 +175,7 @@ def position_stage(
         old=of_start,
         end=end,
         of_momentum=of_momentum,
+        between=between,
     )
 
 

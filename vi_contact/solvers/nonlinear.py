@@ -199,7 +199,10 @@ class NonlinearSolver:
                 f"{_name(step)} begins where its internal force is NaN or infinite: {self._advice}"
             )
         start = Place(step.guess, step.b, step.active)
-        return Walk(step, forces, start, start, self._reference, self._make_acceleration())
+        walk = Walk(step, forces, start, start, self._reference, self._make_acceleration())
+        # The reference of a body that has turned is of no use: its passes go with a tangent.
+        walk.tangent_due = forces.stage.between is not None
+        return walk
 
     def _go(self, walk: Walk, passes: Passes[Pass]) -> Iterator[Pass]:
         """Yield passes, each from where the ones before point to. Collective.

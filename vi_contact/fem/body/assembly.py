@@ -48,17 +48,19 @@ from .assembly_checks import (
     refuse_folded,
     refuse_in_yielding,
 )
-from .conditions import as_tuple, gather_conditions
+from .conditions import Conditions, as_tuple, gather_conditions
 from .dashpots import DashpotMatrix, Dashpots, describe_boundaries
 from .dirichlet import choose_space, read_values, refuse_contradictions, refuse_uneven
 from .elimination import Elimination
 from .forms import ElasticForms, Materials, cell_materials
+from .hyperelastic import TURNING
 from .initial_strains import InitialStrain, InitialStrains
 from .linear_forms import AnyLoad, LinearForm, Loads
 from .loads import BodyForce, Prescribed, Traction, evaluate
 from .own_forms import Forms, OwnForms
 from .space import FemSpace, translations
 from .ties import Tied
+from .turning_forms import TurningForms
 from .yielding_forms import YieldingForms
 
 Field = tuple[float, ...] | Callable[[Array], Array]
@@ -103,7 +105,8 @@ def assemble(
             (docs/guide/second_order.md).
         material: LinearElastic, Orthotropic or fem.Heterogeneous, a material that yields
             (``laws.J2``, DruckerPrager, MohrCoulomb, Iwan: docs/guide/yielding.md), or (cells,
-            material) pairs that cover the mesh.
+            material) pairs that cover the mesh. A body that turns is of SaintVenantKirchhoff,
+            NeoHookean or fem.Hyperelastic alone (docs/guide/turning.md).
         forms: the user's own weak forms, ``fem.Forms``; a material beside them gives the density
             where they have no mass, and the wave speeds that dashpots and free fields need. Without
             a mass at all the system is for static stages alone.
@@ -196,11 +199,7 @@ def assemble(
     check_nodes(comm, nodes, degree)
     if nodes.curved:
         refuse_folded(mesh)
-    # what conditions hold of the owned blocks of the displacement's space
-    places = [compat.locate_owned_blocks(V, held.facets.indices) for held in conditions.held]
-    supports = []
-    for held, on_facets in zip(conditions.held, places, strict=True):
-        supports.append(held.support(on_facets, mesh.geometry.dim))
+    supports = _find_supports(mesh, V, conditions)
     if bcs:
         supports += [values.support(nodes.owned) for values in read_values(mesh, V, bcs)]
     space = FemSpace(
@@ -214,9 +213,18 @@ def assemble(
     materials = [] if material is None else cell_materials(mesh, material)
     if any(isinstance(given, YieldingMaterial) for _, given in materials):
         refuse_in_yielding(forms, conditions.loads)
-    body = _state_body(
-        space, materials, forms, section, damping, integration=integration, stress=initial_stress
-    )
+    if forms is None:
+        body = _state_body(
+            space,
+            materials,
+            section,
+            damping,
+            conditions,
+            integration=integration,
+            stress=initial_stress,
+        )
+    else:
+        body = OwnForms(space, forms, materials, section, damping)
     body.boundaries = conditions.dashpots
     check_ratios(
         damping,
@@ -277,29 +285,44 @@ def assemble(
     return system
 
 
+def _find_supports(mesh: Any, V: Any, conditions: Conditions) -> list[Any]:
+    """Return what conditions hold of the owned blocks of the displacement's space. Collective.
+
+    Args:
+        mesh: of the body.
+        V: the space.
+        conditions: what holds the body.
+    """
+    places = [compat.locate_owned_blocks(V, held.facets.indices) for held in conditions.held]
+    supports = []
+    for held, on_facets in zip(conditions.held, places, strict=True):
+        supports.append(held.support(on_facets, mesh.geometry.dim))
+    return supports
+
+
 def _state_body(
     space: FemSpace,
     materials: list[tuple[Any, Any]],
-    forms: Forms | None,
     section: Section,
     damping: Damping,
+    conditions: Conditions,
     *,
     integration: str,
     stress: Callable[[Array], Array] | None,
 ) -> ElasticForms:
-    """Return the forms of the body: of its materials, elastic or yielding, or the user's.
+    """Return the forms of a body of materials, which yields, turns, or does neither. Collective.
 
     Args:
-        space: the body's unknowns.
+        space: its unknowns.
         materials: pairs of local cells and a material.
-        forms: the user's own, or None.
         section: that of the body.
         damping: the law of C.
+        conditions: what holds, damps and loads it.
         integration: "full", "selective" or "bbar".
         stress: that of a yielding body at the start, or None.
     """
-    if forms is not None:
-        return OwnForms(space, forms, materials, section, damping)
+    if any(isinstance(given, TURNING) for _, given in materials):
+        return TurningForms(space, materials, section, damping, conditions)
     if any(isinstance(given, YieldingMaterial) for _, given in materials):
         return YieldingForms(
             space, materials, section, damping, integration=integration, initial_stress=stress

@@ -26,12 +26,13 @@ from ..mesh.tagged_mesh import Cells
 from .dashpots import Dashpots
 from .dilatation import MeanDilatation
 from .heterogeneous import Heterogeneous
+from .hyperelastic import TURNING, TurningMaterial
 from .space import FemSpace
 
-Material = LinearElastic | Orthotropic | Heterogeneous | YieldingMaterial
+Material = LinearElastic | Orthotropic | Heterogeneous | YieldingMaterial | TurningMaterial
 Materials = Material | Sequence[tuple[Cells, Material]]
 FIELDS = ("lame", "shear", "rho", "alpha_rho", "beta", "lame_out")
-KINDS = (LinearElastic, Orthotropic, Heterogeneous, YieldingMaterial)
+KINDS = (LinearElastic, Orthotropic, Heterogeneous, YieldingMaterial, *TURNING)
 
 
 class ElasticForms:

@@ -68,10 +68,7 @@ class InternalForms:
     def force(self, u: Array) -> Array:
         """Return p(u) (n,) [N]. Collective."""
         self._put(u)
-        vector = compat.assemble_vector(self._force)
-        full = np.array(vector.array_r)
-        vector.destroy()
-        return self._space.pull(full)
+        return self._assemble_force(self._force)
 
     def energy(self, u: Array) -> float:
         """Return W(u) [J], of all ranks. Collective."""
@@ -81,7 +78,18 @@ class InternalForms:
     def tangent(self, u: Array) -> Matrix:
         """Return p'(u) (n, n) [N/m]. Collective."""
         self._put(u)
-        full = compat.assemble_matrix(self._slope)
+        return self._assemble_tangent(self._slope)
+
+    def _assemble_force(self, form: Any) -> Array:
+        """Return a linear form on the free unknowns (n,) [N]. Collective."""
+        vector = compat.assemble_vector(form)
+        full = np.array(vector.array_r)
+        vector.destroy()
+        return self._space.pull(full)
+
+    def _assemble_tangent(self, form: Any) -> Matrix:
+        """Return a bilinear form on the free unknowns (n, n) [N/m]. Collective."""
+        full = compat.assemble_matrix(form)
         part = self._space.elimination.reduce(full)
         full.destroy()
         return self._algebra.store(transfer(part, self._algebra.comm.mpi))

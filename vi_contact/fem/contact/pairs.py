@@ -27,6 +27,7 @@ from ...core.checks import describe_point, flag, optional, provides
 from ...core.collective import together
 from ...core.corners import FEATURE_ANGLE
 from ...core.errors import InputError
+from ...core.internal import turns
 from ...core.obstacles import PRESS_FIT
 from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem
@@ -186,6 +187,12 @@ def _check_pair(
     Raises:
         InputError: on all ranks, wrong arguments.
     """
+    if turns(getattr(system, "internal", None)):
+        raise InputError(
+            "contact_pair: bodies that turn have contact with flat rigid supports alone, as the "
+            "normals between two bodies would turn: give LinearElastic materials, or "
+            "contact_surface(system, obstacle=HalfSpace(…))"
+        )
     space = contact_space(
         "contact_pair",
         system,

@@ -44,6 +44,7 @@ from .faces import (
     split_at_corners,
     tell_corners,
 )
+from .flat_supports import choose_boundary, make_flat_question
 from .frames import FemSurface, NodalFrames, gather_frame_data, snap_to_axes, surface_of
 from .hinges import gather_points, mark_hinges, refuse_hinges
 from .matching import EDGE_ON
@@ -57,7 +58,7 @@ log = logging.getLogger(__name__)
 @report_time("contact")
 def contact_surface(
     system: SemiDiscreteSystem,
-    facets: Facets,
+    facets: Facets | None = None,
     *,
     obstacle: Obstacle | None = None,
     points: Sequence[Sequence[float]] | None = None,
@@ -79,9 +80,13 @@ def contact_surface(
     angle between them (``fem.contact.faces``). Where the obstacle gives all faces of a node one
     direction, as a HalfSpace does, the node has one condition.
 
+    A body that turns (of SaintVenantKirchhoff, for example) may land with any node, on whichever
+    side of it the node lies at the start: all of them have a condition with the flat support, whose
+    normal does not turn (``fem.contact.flat_supports``).
+
     Args:
         system: the system of the body, of ``assemble``.
-        facets: the part of the boundary.
+        facets: the part of the boundary; None: all of the boundary of a body that turns.
         obstacle: Touching() by default, HalfSpace, AnalyticGap or the user's own; it is asked for
             every face of a node.
         points: (k, d) coordinates; each is replaced by the nearest node of the facets. The order is
@@ -94,8 +99,10 @@ def contact_surface(
     Raises:
         InputError: no contact nodes, nodes that only glue two bodies together, a listed point that
             is clamped or not on the facets, a contact direction that is partly prescribed, initial
-            penetration, a node with more faces than the body has dimensions.
+            penetration, a node with more faces than the body has dimensions; another obstacle than
+            a HalfSpace before a body that turns.
     """
+    facets, body_turns = choose_boundary(system, facets, obstacle)
     space = contact_space(
         "contact_surface",
         system,
@@ -130,10 +137,13 @@ def contact_surface(
 
     # one node for each face, the obstacle's answer there, and one condition for each direction
     around = gather_boundary(space, facets, beyond=angle)
-    nodes, _ = split_at_corners(space, around, whole, angle)
+    nodes = whole if body_turns else split_at_corners(space, around, whole, angle)[0]
     slots = slots_of(comm, _places(nodes, chosen))
     count = round(total(comm, len(slots)))
-    ask = _make_question(obstacle, space.size, facets.name, angle, count)
+    if body_turns:
+        ask = make_flat_question(obstacle, space.size)
+    else:
+        ask = _make_question(obstacle, space.size, facets.name, angle, count)
     directions, gap = ask_alike(comm, slots, ask, nodes.points, nodes.normals)
     nodes, directions, gap = one_per_direction(whole, nodes, directions, gap)
     nodes, directions, gap = merge_ties(space, facets.name, nodes, directions, gap, angle)
@@ -162,7 +172,7 @@ def contact_surface(
         "tied to another": wanted & ~np.isin(every.numbers, nodes.numbers),
     }
     watched: tuple[Watched, ...] = ()
-    if chosen is None:
+    if chosen is None and not body_turns:
         lost, _ = split_at_corners(space, around, every.pick(held), angle)
         watched = _watch_held(space, facets.name, lost, obstacle)
     kinds["shared with another body"] = hinge

@@ -1,0 +1,259 @@
+"""Bodies that turn: energy-momentum steps, in free flight and on flat supports."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import cos, pi, sin
+from typing import Any
+
+import numpy as np
+import pytest
+
+import vi_contact as vc
+from demos.parts.problems import turning
+from demos.parts.problems.turning import RigidBlock
+from vi_contact import fem
+from vi_contact.core.errors import InputError, StepFailure
+from vi_contact.core.ledger import energy_balance
+from vi_contact.meshes.block import BlockMesh
+
+SOFT = vc.SaintVenantKirchhoff(E=1e6, nu=0.3, rho=1000.0)
+STIFF = vc.SaintVenantKirchhoff(E=1e9, nu=0.0, rho=2000.0)
+FLOOR = vc.HalfSpace((0.0, 0.0), (0.0, 1.0))
+
+
+@dataclass(frozen=True)
+class OneEnd:
+    """The internal force p(u) of a body that turns, without that of both ends of a step."""
+
+    both: Any
+
+    def force(self, u: np.ndarray) -> np.ndarray:
+        return np.asarray(self.both.force(u))
+
+    def energy(self, u: np.ndarray) -> float:
+        return float(self.both.energy(u))
+
+    def tangent(self, u: np.ndarray) -> Any:
+        return self.both.tangent(u)
+
+
+def follow(problem: vc.ContactProblem, dt: Any, **more: Any) -> tuple[Any, float, float]:
+    """The last state, and the largest changes of energy and of momenta over those at the start."""
+    start: Any = None
+    energy = momenta = 0.0
+    for state, report in vc.march(problem, dt=dt, **more):
+        if start is None:
+            start = (
+                turning.find_energy(problem, report.old),
+                turning.find_momenta(problem, report.old),
+            )
+        energy = max(energy, abs(turning.find_energy(problem, state) / start[0] - 1.0))
+        change = turning.find_momenta(problem, state) - start[1]
+        momenta = max(momenta, float(np.abs(change).max() / np.abs(start[1]).max()))
+    return state, energy, momenta
+
+
+@pytest.mark.parametrize(("E", "turns"), [(1e6, 10), (1e8, 2)])
+def test_ten_turns_keep_energy_and_spin(comm: Any, E: float, turns: int) -> None:
+    """At 20 steps a turn. Round-off of the forces adds up: it grows with E."""
+    problem = turning.spin_block(comm, replace(SOFT, E=E), divisions=(2, 4))
+    _, energy, momenta = follow(problem, 0.05, steps=20 * turns)
+    assert energy < 1e-10
+    assert momenta < 1e-10
+
+
+def test_the_trapezoidal_rule_blows_up_in_three_turns(comm: Any) -> None:
+    """The same block, mass and step length, without the force of both ends."""
+    problem = turning.spin_block(comm, replace(SOFT, E=1e8), divisions=(2, 4))
+    system = problem.system
+    plain = system.changed(internal=OneEnd(system.internal))
+    problem = vc.ContactProblem(plain, problem.surface, mass=vc.ConsistentMass())
+    grown = 0.0
+    try:
+        for state, report in vc.march(
+            problem, scheme=vc.Trapezoidal(mass=vc.ConsistentMass()), dt=0.05, steps=60
+        ):
+            before = turning.find_energy(problem, report.old)
+            grown = max(grown, turning.find_energy(problem, state) / before)
+    except StepFailure:
+        grown = np.inf
+    assert grown > 1.5
+
+
+def test_a_turned_start_gives_a_turned_run(comm: Any) -> None:
+    """No axis of space is better than another, at any strain."""
+    ends = []
+    angle = 0.7
+    R = np.array([[cos(angle), sin(angle)], [-sin(angle), cos(angle)]])
+    for turned in (False, True):
+        turn = R if turned else np.eye(2)
+        problem = turning.spin_block(
+            comm,
+            vc.NeoHookean(E=1e5, nu=0.3, rho=1000.0),
+            divisions=(2, 4),
+            initial_displacement=lambda x, turn=turn: (x * (1.0 + 0.1 * x)) @ turn.T - x,
+            initial_velocity=lambda x, turn=turn: (6.0 * x[:, ::-1] * [-1.0, 1.0]) @ turn.T,
+        )
+        *_, (state, _) = vc.march(problem, dt=0.01, steps=20)
+        points = problem.system.space.coordinates[::2]
+        ends.append(points + problem.cartesian(state.u).reshape(-1, 2))
+    off = comm.allreduce(np.abs(ends[1] - ends[0] @ R.T).max(initial=0.0), op=max)
+    assert off < 1e-10
+
+
+@pytest.mark.parametrize("simplices", [False, True])
+def test_a_box_tumbles_in_space(comm: Any, simplices: bool) -> None:
+    """About no axis of inertia, of rubber: the spin vector is kept while the box tumbles."""
+    problem = turning.spin_block(
+        comm,
+        vc.NeoHookean(E=1e6, nu=0.3, rho=1000.0),
+        lengths=(0.3, 0.6, 1.0),
+        divisions=(1, 2, 3),
+        spin=(2.0, 4.0, 1.0),
+        simplices=simplices,
+    )
+    _, energy, momenta = follow(problem, 0.05, steps=20)
+    assert energy < 1e-10
+    assert momenta < 1e-10
+
+
+def test_drag_slows_a_flight_down_by_its_own_rate(comm: Any) -> None:
+    """C = c/rho M is the same in any position: each step takes (2 - a dt)/(2 + a dt) of v."""
+    rate = 3.0
+    problem = turning.spin_block(
+        comm, SOFT, divisions=(1, 2), damping=vc.MassProportional(rate * SOFT.rho)
+    )
+    dt = 0.01
+    found: list[Any] = []
+    for state, report in vc.march(problem, dt=dt, steps=10):
+        if not found:
+            found.append(turning.find_momenta(problem, report.old))
+        found.append(turning.find_momenta(problem, state))
+    # the drag acts on middle places, whose spin is that of both ends but for the strain
+    kept = ((2.0 - rate * dt) / (2.0 + rate * dt)) ** 10
+    assert found[-1][2] / found[0][2] == pytest.approx(kept, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("width", "theta0", "off"), [(0.5, 0.1, 5e-4), (0.5, 0.3, 1e-3), (1.0, 0.5, 3e-4)]
+)
+def test_a_block_rocks_as_the_rigid_one(comm: Any, width: float, theta0: float, off: float) -> None:
+    """Quarter periods. Energy is lost at landings alone, each time the work of the closing nodes:
+    the ledger knows it to round-off."""
+    block = RigidBlock(width, 1.0)
+    quarter = block.find_quarter(theta0)
+    dt = quarter / 50.0
+    problem = turning.rock_block(comm, block, theta0, material=STIFF, divisions=(2, 4))
+    unit = STIFF.rho * width * turning.GRAVITY * block.radius
+    tilts = [theta0]
+    lost = landing = 0.0
+    for state, report in vc.march(problem, dt=dt, steps=52):
+        step = energy_balance(problem, report.old, report.new, report.averages())
+        assert abs(step.algorithmic) < 1e-14 * unit
+        assert abs(step.defect) < 1e-11 * unit
+        opened = problem.surface.everywhere(state.active).sum() <= 1
+        if opened and not landing:
+            assert lost + step.contact < 1e-3 * unit
+        elif not landing:
+            t = report.old.t
+            landing = turning.find_landing(block, t, tilts[-1], tilts[-2], dt)
+        lost += step.contact
+        tilts.append(turning.find_tilt(problem, state))
+    assert landing == pytest.approx(quarter, rel=off)
+
+
+def test_a_column_falls_over_and_lies(comm: Any) -> None:
+    """Beside the rigid block's equation until it lands; its side comes to rest on the floor, and
+    no node goes through it."""
+    block = RigidBlock(0.5, 2.0)
+    pulse = vc.HalfSine(amplitude=-7.0, duration=0.8)
+    rigid = block.fall_over(lambda t: -pulse.acceleration(t), 2.0)
+    problem = turning.shake_column(comm, block, pulse, material=STIFF, divisions=(2, 8))
+    lies = float(rigid.t[-1])
+    worst = lowest = 0.0
+    for state, _ in vc.march(problem, dt=0.01, t_end=lies + 0.5):
+        gap = problem.surface.gap(state.t) - problem.surface.normal_values(state.u)
+        lowest = min(lowest, -comm.allreduce(-gap.min(initial=np.inf), op=max))
+        tilt = turning.find_tilt(problem, state)
+        if state.t < lies - 0.05:
+            worst = max(worst, abs(tilt - rigid.sol(state.t)[0]))
+    assert worst < 0.04
+    assert tilt == pytest.approx(0.5 * pi, abs=0.02)
+    assert lowest > -1e-12
+
+
+@pytest.mark.serial
+def test_a_restart_is_the_straight_run(tmp_path: Any) -> None:
+    from mpi4py import MPI
+
+    def run(steps: int, **more: Any) -> Any:
+        problem = turning.rock_block(MPI.COMM_SELF, RigidBlock(0.5, 1.0), 0.3, divisions=(2, 4))
+        return vc.simulate(problem, dt=0.01, steps=steps, progress=False, **more)
+
+    whole = run(30)
+    run(20, out=tmp_path)
+    again = run(30, out=tmp_path, restart=True)
+    assert np.array_equal(whole.state.u, again.state.u)
+    assert np.array_equal(whole.state.v, again.state.v)
+
+
+def test_steps_are_halved_where_a_corner_lands(comm: Any) -> None:
+    """Halves lose less: a closure loses its force times the gap that is left to close."""
+    lost = []
+    for plan in (0.02, vc.HalvedAtImpact(0.02, halvings=4)):
+        problem = turning.rock_block(comm, RigidBlock(0.5, 1.0), 0.2, divisions=(2, 4))
+        first = None
+        for _, report in vc.march(problem, dt=plan, t_end=0.34):
+            first = turning.find_energy(problem, report.old) if first is None else first
+        lost.append(first - turning.find_energy(problem, report.new))
+    assert 0.0 < lost[1] < 0.5 * lost[0]
+
+
+def test_a_block_is_thrown_into_a_corner(comm: Any) -> None:
+    """Floor and wall: any node may land on either. Contact creates no energy, and what the walls
+    give is the change of momentum."""
+    mesh, _ = fem.build_mesh(
+        BlockMesh(lengths=(0.5, 1.0), divisions=(2, 4), corner=(0.3, 0.2)), comm
+    )
+    system = fem.assemble(
+        mesh,
+        SOFT,
+        initial_velocity=lambda x: np.array([-4.0, -2.0]) + 5.0 * x[:, ::-1] * [-1.0, 1.0],
+    )
+    wall = vc.HalfSpace((0.0, 0.0), (1.0, 0.0))
+    surfaces = [fem.contact_surface(system, obstacle=plane) for plane in (FLOOR, wall)]
+    problem = vc.ContactProblem(system, fem.joined_surfaces(*surfaces))
+    before = None
+    impulse = np.zeros(2)
+    touched = np.zeros(2)
+    for state, report in vc.march(problem, dt=2e-3, steps=150):
+        if before is None:
+            before = turning.find_energy(problem, report.old)
+            momenta = turning.find_momenta(problem, report.old)
+        r = problem.surface.everywhere(state.r_n)
+        sides = [r[len(r) // 2 :].sum(), r[: len(r) // 2].sum()]
+        impulse += 2e-3 * np.array(sides)
+        touched += np.array(sides) > 0.0
+        after = turning.find_energy(problem, state)
+        assert after <= before * (1.0 + 1e-10)
+    assert np.all(touched > 0)
+    change = turning.find_momenta(problem, state) - momenta
+    assert np.allclose(change[:2], impulse, rtol=1e-9)
+
+
+@pytest.mark.serial
+def test_schemes_that_blow_up_are_refused() -> None:
+    from mpi4py import MPI
+
+    problem = turning.spin_block(MPI.COMM_SELF, SOFT, divisions=(1, 2))
+    for scheme in (vc.Trapezoidal(), vc.Midpoint(), vc.HHT(-0.05)):
+        with pytest.raises(InputError, match=r"give EnergyMomentum\(\)"):
+            next(vc.march(problem, scheme=scheme, dt=0.01, steps=1))
+    rotated = replace(problem, mass=vc.Redistributed())
+    with pytest.raises(InputError, match="does not go with mass=Redistributed"):
+        next(vc.march(rotated, dt=0.01, steps=1))
+    plain = problem.system.changed(internal=OneEnd(problem.system.internal))
+    other = vc.ContactProblem(plain, problem.surface)
+    with pytest.raises(InputError, match="needs the internal force of both ends"):
+        next(vc.march(other, scheme=vc.EnergyMomentum(), dt=0.01, steps=1))
