@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from vi_contact.practice.engineering.peak_values import find_stretch
 from vi_contact.practice.studies import read_case
 from vi_contact.practice.studies.refinement import refine
 from vi_contact.run.files.reading import read_run
@@ -43,11 +44,8 @@ Row = tuple[str, str, float]
 
 def lasts(t: np.ndarray, values: np.ndarray) -> float:
     """Return how long a peak lasts above 90 % of it [s], both ways from its time."""
-    peak = int(np.argmax(values))
-    below = np.flatnonzero(values < 0.9 * values[peak])
-    before = below[below < peak].max(initial=-1)
-    after = below[below > peak].min(initial=len(values))
-    return float((after - before - 1) * (t[1] - t[0]))
+    first, last = find_stretch(values)
+    return float((last - first + 1) * (t[1] - t[0]))
 
 
 def mean_peak(t: np.ndarray, values: np.ndarray) -> float:

@@ -218,6 +218,7 @@ def test_facts_are_those_of_the_model(tmp_path: Path) -> None:
     assert facts.find_mu("stem") == 0.2 and facts.find_mu("base") is None
     assert facts.find_mu("other") is None and FACTS.find_mu("ground_base") == 0.5
     assert ModelFacts(friction={"a": 0.3, "b": 0.3}).find_mu("all") == 0.3
+    assert ModelFacts(friction={"base on rock": 0.5, "base on fill": 0.3}).find_mu("base") is None
     (tmp_path / "model.json").write_text('{"contact": [{"name": 1}]}', encoding="utf-8")
     with pytest.raises(InputError, match="is damaged"):
         ModelFacts.read(tmp_path)

@@ -3,7 +3,7 @@ axis, structures large, names that do not cover each other."""
 
 from __future__ import annotations
 
-from itertools import combinations
+from itertools import combinations, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from matplotlib import colormaps
 from matplotlib.colors import LinearSegmentedColormap, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from vi_contact.practice.plots.bodies import Scene
 from vi_contact.practice.plots.borders import chain_border
@@ -299,6 +300,34 @@ def test_a_sketch_has_sizes_names_and_loads() -> None:
     assert count_arrows(axis) == 2 + 2  # two lines with the sizes
     for less in ({}, {"loads": None}, {"loads": [{"name": "odd"}]}):
         assert count_arrows(sketch(model_of(**less)).axes[0]) == 2
+
+
+def test_loads_in_space_are_arrows_too() -> None:
+    """The arrow of a load ends at its point and has its name; that of a weight begins there."""
+    corners = [[0, 0, 0], [4, 0, 0], [4, 3, 0], [0, 3, 0]]
+    edges = [one + other for one, other in pairwise([*corners, corners[0]])]
+    top = [[x, y, 2, u, v, 2] for x, y, _, u, v, _ in edges]
+    loads = [
+        {"name": "wind", "kind": "Pressure", "force": [3e4, 0.0, 0.0], "point": [0.0, 1.5, 1.0]},
+        {"name": "weight", "kind": "weight", "force": [0.0, 0.0, -6e4], "point": [2.0, 1.5, 1.0]},
+    ]
+    model = {
+        "title": "A block",
+        "dimension": 3,
+        "bodies": [{"name": "block"}],
+        "supports": [],
+        "contact": [],
+        "outline": [{"group": "", "lines": edges + top}],
+        "loads": loads,
+    }
+    (axis,) = sketch(model).axes
+    assert {one.get_text() for one in axis.texts} == {"block", "wind: 30 kN", ""}
+    arrows = [one for one in axis.collections if isinstance(one, Line3DCollection)][-2:]
+    wind, weight = (np.array(one._segments3d[0]) for one in arrows)
+    assert wind.max(axis=0) == pytest.approx([0.0, 1.5, 1.0]) and wind[:, 0].min() < 0.0
+    # the largest load has the longest arrow, 0.16 of the model
+    assert weight.max(axis=0) == pytest.approx([2.0, 1.5, 1.0])
+    assert weight.min(axis=0) == pytest.approx([2.0, 1.5, 1.0 - 0.16 * 4.0])
 
 
 def test_borders_of_bodies() -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -133,6 +135,31 @@ def test_the_pressure_at_rest(
     assert axis.get_ylabel() == "height above the foot [m]"
     assert lines["at rest"].get_linestyle() != lines["Mononobe–Okabe, kh = 0.2"].get_linestyle()
     assert (folder / "profile.png").is_file()
+
+
+def test_units_of_the_sheet(
+    folder: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """What the report of a run is written in, its profile is too; the table stays in SI units."""
+    figures = keep_figures(monkeypatch, pressure_profile)
+    other = shutil.copytree(folder, tmp_path / "run")
+    case = other / "case.toml"
+    sheet = '\n[sheet]\nunits = {force = "MN", size = "cm", stress = "MPa"}\n'
+    case.write_text(case.read_text(encoding="utf-8") + sheet, encoding="utf-8")
+    assert main(["post", "profile", str(other), "stem"]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert re.findall(r"\[(.*?)\]", said[0]) == ["MN/m", "cm", "MN m/m"]
+    assert [float(word) for word in said[1].split()[-3:]] == [0.03, 101.4, 0.03042]
+    assert read_table(other / "profile.csv")[0]["height_m"] == "0"
+    (axis,) = figures[0].axes
+    assert axis.get_xlabel() == "normal pressure [MPa]"
+    assert axis.get_ylabel() == "height above the foot [cm]"
+    lines = {line.get_label(): line for line in axis.lines}
+    assert lines["at rest"].get_xdata()[0] == pytest.approx(0.02, rel=1e-9)
+    assert axis.get_ylim()[1] == pytest.approx(300.0)
 
 
 def test_a_box_of_resultants(folder: Path, tmp_path: Path) -> None:

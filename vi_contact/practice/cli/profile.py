@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from ...core.checks import quote
 from ...core.errors import InputError
 from ...core.files import write_csv
-from ..units.report_units import ReportUnits, choose_unit, write_number
+from ..units.report_units import choose_unit, write_number
 from .options import add_command, add_folder
 from .tables import add_table, choose_table
 
@@ -62,7 +62,13 @@ def _write_profile(options: argparse.Namespace) -> str:
     table = choose_table(options)
     write_csv(table, HEADER, _list_rows(report.profiles))
     title = f"Pressure on '{report.part}'"
-    picture = draw_profile(report.profiles, report.lines, table.with_suffix(".png"), title=title)
+    picture = draw_profile(
+        report.profiles,
+        report.lines,
+        table.with_suffix(".png"),
+        title=title,
+        units=report.units,
+    )
     return "\n".join([*_describe(report), f"table: {table}", f"picture: {picture}"])
 
 
@@ -95,7 +101,7 @@ def _describe(report: "ProfileReport") -> list[str]:
     columns = [
         choose_unit(
             unit,
-            ReportUnits(),
+            report.units,
             quantity=quantity,
             slice_thickness=None if quantity == "size" else report.width,
         )

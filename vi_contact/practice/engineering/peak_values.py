@@ -19,6 +19,7 @@ from ...core.step import Columns
 HEADER = ("name", "quantity", "unit", "max", "t_max", "min", "t_min")
 GROWS = "; raw, not convergent at impacts: it grows as dt falls"
 _NOT_PEAKS = ("t", "k", "iterations", "escalated")
+NEARLY = 0.9  # of a peak: it lasts while the values around it are above
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,23 @@ def peaks(
             numbers = [float(x) for x in (values[high], t[high], values[low], t[low])]
         rows.append(Peak(name, quantity, unit, *numbers))
     return rows
+
+
+def find_stretch(sizes: Array) -> tuple[int, int]:
+    """Return the rows about the largest value that are above ``NEARLY`` of it: first and last.
+
+    Rows that are not a number are below.
+
+    Args:
+        sizes: (rows,) of which the largest number is positive.
+    """
+    row = int(np.nanargmax(sizes))
+    below = np.flatnonzero(~(sizes >= NEARLY * sizes[row]))
+    earlier = below[below < row]
+    later = below[below > row]
+    first = int(earlier[-1]) + 1 if len(earlier) else 0
+    last = int(later[0]) - 1 if len(later) else len(sizes) - 1
+    return first, last
 
 
 @check_arguments

@@ -12,9 +12,9 @@ import numpy as np
 from ...core.algebra import Array
 from ..engineering.checks.pressure_line import FormulaLine
 from ..engineering.pressure_profile import PressureProfile
+from ..units.report_units import ReportUnits, choose_unit
 from .histories import canvas, escape_dollars, save
 
-KILO = 1e3
 SIZE = (6.4, 6.0)  # inches
 MARKS = ("o", "s", "^", "D", "v", "P")
 FILLS = ("black", "white")
@@ -30,8 +30,9 @@ def draw_profile(
     path: str | Path,
     *,
     title: str,
+    units: ReportUnits = ReportUnits(),
 ) -> Path:
-    """Draw pressure [kPa] over height [m], and return the path.
+    """Draw pressure over height, and return the path.
 
     Points that the other side hardly covers are left out, and so are formulas that do not apply.
     A passive pressure may leave the picture: its axis fits the other lines.
@@ -41,15 +42,18 @@ def draw_profile(
         lines: of the formulas.
         path: the picture; its ending says the format.
         title: stands above it.
+        units: of the pressure and of the height.
     """
+    per_pressure, pressure_unit = choose_unit("Pa", units)
+    per_height, height_unit = choose_unit("m", units, quantity="size")
     figure, ((axis,),) = canvas(1, 1, SIZE)
     largest = []
     drawn = [line for line in lines if not line.applies]
     for number, line in enumerate(drawn):
-        pressure = line.pressure / KILO
+        pressure = per_pressure * line.pressure
         axis.plot(
             pressure,
-            line.heights,
+            per_height * line.heights,
             color=GREYS[number // len(PATTERNS) % len(GREYS)],
             ls=PATTERNS[number % len(PATTERNS)],
             lw=1.6,
@@ -58,10 +62,10 @@ def draw_profile(
         largest += [] if line.passive else [float(pressure.max())]
     for number, profile in enumerate(profiles):
         has_pressure = np.array(profile.states) != "hardly covered"
-        pressure = profile.pressure[has_pressure] / KILO
+        pressure = per_pressure * profile.pressure[has_pressure]
         axis.plot(
             pressure,
-            profile.heights[has_pressure],
+            per_height * profile.heights[has_pressure],
             color="black",
             lw=1.2,
             marker=MARKS[number % len(MARKS)],
@@ -74,12 +78,13 @@ def draw_profile(
         largest.append(float(pressure.max(initial=0.0)))
 
     # The wall stands at the left, from its foot up.
+    lowest = min(0.0, *(float(one.heights.min()) for one in profiles))
     highest = _find_highest(profiles, drawn)
     width = ROOM * max(largest, default=0.0)
     axis.set(
-        xlabel="normal pressure [kPa]",
-        ylabel="height above the foot [m]",
-        ylim=(min(0.0, *(float(one.heights.min()) for one in profiles)), highest),
+        xlabel=f"normal pressure [{pressure_unit}]",
+        ylabel=f"height above the foot [{height_unit}]",
+        ylim=(per_height * lowest, per_height * highest),
         title=escape_dollars(title),
     )
     if width > 0.0:

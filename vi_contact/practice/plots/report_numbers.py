@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from ...core.algebra import Array
 from ..units.report_units import ReportUnits, Written, choose_unit, write_number
 
 PERCENT = (100.0, "%")
@@ -63,8 +62,3 @@ def read_slice(model: Mapping[str, Any]) -> float | None:
     thickness = section.get("thickness", 1.0)
     is_number = isinstance(thickness, int | float) and not isinstance(thickness, bool)
     return float(thickness) if is_number and thickness > 0.0 else None
-
-
-def is_upright(part: str, history: Mapping[str, Array]) -> bool:
-    """Say whether a part of the contact stands upright: it has a height, and its thrust a level."""
-    return bool(np.isfinite(history.get(f"level_{part}", np.nan)).any())

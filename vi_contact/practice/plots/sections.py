@@ -15,6 +15,7 @@ import numpy as np
 from ...core.errors import InputError
 from ...core.units import STANDARD_GRAVITY
 from ...run.files.reading import RunFolder
+from ...run.recorders.contact_parts import is_upright
 from ...run.solution import energy_warning
 from ..engineering.peak_values import peaks
 from ..units.report_units import ReportUnits, write_number
@@ -22,7 +23,7 @@ from . import charts
 from .charts import Chart
 from .histories import LEDGER
 from .maps import Drawing, list_maps
-from .report_numbers import PLACES, ReportNumbers, is_upright, read_slice
+from .report_numbers import PLACES, ReportNumbers, read_slice
 from .report_words import (
     CHARTS,
     HEADERS,

@@ -5,6 +5,7 @@ by name, and loads as arrows.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -90,15 +91,16 @@ def sketch(model: Mapping[str, Any], units: ReportUnits = ReportUnits()) -> Any:
     set_limits(axis, low, high, margin=ROOM)
 
     title = escape_dollars(model["title"])
+    numbers = ReportNumbers(units, read_slice(model))
     if d == 3:
         title += "\n" + " × ".join(f"{write_number(length)} m" for length in high - low)
         _write_names_in_space(axis, model)
+        _draw_loads_in_space(axis, model.get("loads"), size, numbers)
     else:
         room = Labels(axis, WIDTH / float(np.ptp(axis.get_xlim())))
         _write_size(room, low, high, BEYOND * size)
         _write_names(room, model, holds, d)
-        numbers = ReportNumbers(units, read_slice(model))
-        _draw_loads(room, model.get("loads"), d, size, numbers)
+        _draw_loads(room, model.get("loads"), size, numbers)
     axis.set_title(title, fontsize=11)
     handles, labels = axis.get_legend_handles_labels()
     names = [cut(label, LONGEST) for label in labels]
@@ -215,40 +217,83 @@ def _draw_contact(axis: Any, part: Mapping[str, Any], d: int, colour: str, marke
             )
 
 
-def _draw_loads(labels: Labels, loads: Any, d: int, size: float, numbers: ReportNumbers) -> None:
-    """Draw each load that has a resultant and a point as an arrow to this point, with its name.
-
-    Weights are drawn from the middle of their body, without names.
+def _draw_loads(labels: Labels, loads: Any, size: float, numbers: ReportNumbers) -> None:
+    """Draw the loads in the plane as arrows, with the names of those that are no weights.
 
     Args:
         labels: of the picture.
         loads: of model.json.
-        d: dimension of the model.
         size: largest one of the model [m].
         numbers: writes the resultants, which stand beside the names.
     """
-    if d != 2:
-        return
-    drawn = list(_list_loads(loads))
-    most = max((float(np.linalg.norm(force)) for *_, force in drawn), default=0.0)
-    names = []
-    for name, weight, point, force in drawn:
-        length = float(np.linalg.norm(force))
-        along = force / length
-        arrow = ARROW * size * (LEAST_ARROW + (1.0 - LEAST_ARROW) * length / most) * along
-        tail = point if weight else point - arrow
-        tip = tail + arrow
+    arrows = _arrange_arrows(loads, 2, size, numbers)
+    for arrow in arrows:
         look = {"arrowstyle": "-|>", "lw": 1.6, "color": "black", "shrinkA": 0, "shrinkB": 0}
-        labels.axis.annotate("", tip, tail, arrowprops=look, zorder=6)
-        labels.reserve(np.array([tip, tail]))
-        if not weight:
-            names.append((f"{name}: {numbers.write(length, '', 'N')}", tail, -along))
-    for name, tail, away in names:
-        labels.write(escape_dollars(name), tail, away, style="italic")
+        labels.axis.annotate("", arrow.tip, arrow.tail, arrowprops=look, zorder=6)
+        labels.reserve(np.array([arrow.tip, arrow.tail]))
+    for arrow in arrows:
+        if arrow.name:
+            labels.write(arrow.name, arrow.tail, arrow.tail - arrow.tip, style="italic")
 
 
-def _list_loads(loads: Any) -> Iterator[tuple[str, bool, Array, Array]]:
-    """Yield (name, whether it is a weight, point, force) of loads in the plane that have both."""
+def _draw_loads_in_space(axis: Any, loads: Any, size: float, numbers: ReportNumbers) -> None:
+    """Draw the loads in space as arrows, with the names of those that are no weights.
+
+    Args:
+        axis: of the picture.
+        loads: of model.json.
+        size: largest one of the model [m].
+        numbers: writes the resultants, which stand beside the names.
+    """
+    for arrow in _arrange_arrows(loads, 3, size, numbers):
+        along = arrow.tip - arrow.tail
+        axis.quiver(*arrow.tail, *along, color="black", lw=1.6, arrow_length_ratio=0.3)
+        axis.text(*arrow.tail, arrow.name, fontsize=7, style="italic", ha="right", va="bottom")
+
+
+@dataclass(frozen=True)
+class _Arrow:
+    """Hold the arrow of a load.
+
+    Attributes:
+        name: with the resultant; "" of a weight.
+        tail: (d,) [m].
+        tip: (d,) [m].
+    """
+
+    name: str
+    tail: Array
+    tip: Array
+
+
+def _arrange_arrows(loads: Any, d: int, size: float, numbers: ReportNumbers) -> list[_Arrow]:
+    """Return an arrow for each load that has a resultant and a point: it ends at this point.
+
+    That of a weight begins there, in the middle of its body.
+
+    Args:
+        loads: of model.json.
+        d: dimension of the model.
+        size: largest one of the model [m].
+        numbers: writes the resultants.
+    """
+    drawn = list(_list_loads(loads, d))
+    most = max((float(np.linalg.norm(force)) for *_, force in drawn), default=0.0)
+    arrows = []
+    for name, is_weight, point, force in drawn:
+        length = float(np.linalg.norm(force))
+        share = LEAST_ARROW + (1.0 - LEAST_ARROW) * length / most
+        along = ARROW * size * share * force / length
+        if is_weight:
+            arrows.append(_Arrow("", point, point + along))
+            continue
+        label = escape_dollars(f"{name}: {numbers.write(length, '', 'N')}")
+        arrows.append(_Arrow(label, point - along, point))
+    return arrows
+
+
+def _list_loads(loads: Any, d: int) -> Iterator[tuple[str, bool, Array, Array]]:
+    """Yield (name, whether it is a weight, point, force), (d,) each, of loads that have both."""
     for load in loads if isinstance(loads, list | tuple) else ():
         if not isinstance(load, Mapping):
             continue
@@ -258,7 +303,7 @@ def _list_loads(loads: Any) -> Iterator[tuple[str, bool, Array, Array]]:
             continue  # a couple, or what acts on no mesh
         vector = np.array(force, dtype=float)
         place = np.array(point, dtype=float)
-        if vector.shape == place.shape == (2,) and np.any(vector) and np.all(np.isfinite(vector)):
+        if vector.shape == place.shape == (d,) and np.any(vector) and np.all(np.isfinite(vector)):
             name = str(load.get("name", load.get("kind", "load")))
             yield name, load.get("kind") == "weight", place, vector
 
@@ -299,7 +344,8 @@ def _write_names_in_space(axis: Any, model: Mapping[str, Any]) -> None:
     boxes = [part for part in model["outline"] if not part["group"]]
     for body, part in zip(model.get("bodies") or (), boxes, strict=False):
         middle = _find_middle(_read_points(part["lines"], 3))
-        axis.text(*middle, escape_dollars(str(body.get("name", ""))), fontsize=8, ha="center")
+        name = escape_dollars(str(body.get("name", "")))
+        axis.text(*middle, name, fontsize=8, ha="center", va="bottom")
     for k, part in enumerate(model["contact"]):
         points = _read_points(part["places"], 3)
         if len(points):

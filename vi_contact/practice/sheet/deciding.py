@@ -8,8 +8,8 @@ import numpy as np
 from ...core.algebra import Array
 from ...core.errors import InputError
 from ...run.files.reading import RunFolder
-from ..engineering.peak_values import column_of
-from ..plots.report_numbers import is_upright
+from ...run.recorders.contact_parts import is_upright
+from ..engineering.peak_values import column_of, find_stretch
 from .rules import WORDS, History, Measure, Rule, find_columns, find_part, list_rules
 
 FORCES = {"N": "normal force", "T": "shear", "M": "moment about the centre"}  # of parts
@@ -19,7 +19,6 @@ WHOLE = {
     "contact_max_pressure": "largest contact pressure",
     "contact_max_slip": "largest slip",
 }
-NEARLY = 0.9  # of a peak: while a value is above, the peak lasts
 
 
 @dataclass(frozen=True)
@@ -32,7 +31,7 @@ class DecidingNumber:
         measure: what of the column it is.
         value: the number, in the SI unit of its column; nan where the run has none.
         t: when it came [s].
-        seconds: how long it lasted above ``NEARLY`` of its size [s]; nan where it stays.
+        seconds: how long it lasted above 90 % of its size [s]; nan where it stays.
         steps: in how many steps of the run; 0 at the start.
         rule: the rule in words; "" where the case names the column.
     """
@@ -180,7 +179,7 @@ def measure_peak(t: Array, values: Array) -> tuple[float, float, float, int]:
     """Return (peak, its time, how long it lasted, in how many steps).
 
     The peak is the value (rows,) of largest size, with its sign. It lasts while the values around
-    it stay above ``NEARLY`` of it. A row k > 0 stands for the step from t[k - 1] to t[k], row 0 for
+    it stay above 90 % of it. A row k > 0 stands for the step from t[k - 1] to t[k], row 0 for
     none. All are nan, and no step, where there are no numbers.
 
     Args:
@@ -194,12 +193,6 @@ def measure_peak(t: Array, values: Array) -> tuple[float, float, float, int]:
     if peak == 0.0:
         return 0.0, float(t[row]), np.nan, 0
 
-    # The rows around the peak that are nearly as large: from ``first`` up to ``after``.
-    below = np.flatnonzero(~(values * np.sign(peak) >= NEARLY * abs(peak)))
-    earlier = below[below < row]
-    later = below[below > row]
-    first = int(earlier[-1]) + 1 if len(earlier) else 0
-    after = int(later[0]) if len(later) else len(values)
-
-    seconds = float(t[after - 1] - t[max(first - 1, 0)])
-    return peak, float(t[row]), seconds, after - max(first, 1)
+    first, last = find_stretch(values * np.sign(peak))
+    seconds = float(t[last] - t[max(first - 1, 0)])
+    return peak, float(t[row]), seconds, last + 1 - max(first, 1)

@@ -9,12 +9,13 @@ import numpy as np
 
 from ...core.version import __version__
 from ...run.files.reading import RunFolder
+from ..engineering.peak_values import NEARLY
 from ..plots.report_numbers import ReportNumbers
 from ..plots.sections import Section, Table
 from ..units.report_units import Written, write_number
 from .choices import Sheet
 from .convergence import LIMIT, NOT_TESTED, TESTS, Change, compare
-from .deciding import NEARLY, DecidingNumber, Measure, choose_numbers
+from .deciding import DecidingNumber, Measure, choose_numbers
 from .rigid_base import explain_edge_pressures
 from .signs import explain_signs
 

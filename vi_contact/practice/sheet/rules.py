@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from ...core.algebra import Array
-from ..plots.report_numbers import is_upright
+from ...run.recorders.contact_parts import is_upright
 
 History = Mapping[str, Array]  # column -> values (rows,)
 Names = Collection[str]

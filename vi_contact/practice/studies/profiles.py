@@ -14,15 +14,17 @@ from ...core.errors import InputError
 from ...core.own_files import is_own
 from ...run.files.folder import HISTORY_H5, MODEL
 from ...run.files.reading import RunFolder, read_object, read_run
+from ...run.recorders.contact_parts import find_in_box
 from ..engineering.checks.comparison import find_duration
 from ..engineering.checks.earth_pressure_seismic import LayerCheck
 from ..engineering.checks.earth_pressure_static import EarthPressure
-from ..engineering.checks.model_facts import ModelFacts
+from ..engineering.checks.model_facts import ModelFacts, find_owners
 from ..engineering.checks.pressure_line import FormulaLine, make_line
 from ..engineering.pressure_profile import LARGEST, PressureProfile, find_profiles
+from ..units.report_units import ReportUnits
 from .cases.library import read_copy
 from .cases.toml_file import list_tables
-from .report import read_checks
+from .report import read_checks, read_sheet
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,7 @@ class ProfileReport:
         width: of the model across its plane [m], by which forces are divided; None in space where
             no check gives it: forces are then those of the whole.
         notes: sentences about the run.
+        units: of the report of the run.
     """
 
     part: str
@@ -43,6 +46,7 @@ class ProfileReport:
     lines: tuple[FormulaLine, ...]
     width: float | None
     notes: tuple[str, ...]
+    units: ReportUnits = ReportUnits()
 
 
 @check_arguments
@@ -96,7 +100,9 @@ def profile(
         for check in checks
         if not isinstance(check, LayerCheck)
     ]
-    return ProfileReport(part, profiles, tuple(lines), width, _find_notes(run, part, profiles))
+    notes = _find_notes(run, part, profiles)
+    units = read_sheet(folder, read_copy(folder), run).units
+    return ProfileReport(part, profiles, tuple(lines), width, notes, units)
 
 
 def _find_notes(run: RunFolder, part: str, profiles: Sequence[PressureProfile]) -> tuple[str, ...]:
@@ -175,8 +181,7 @@ def _pick_contact(
         folder: of the run.
     """
     names = [name for name, _ in contacts]
-    owners = [name for name in names if part == name]
-    owners = owners or [name for name in names if part in name.split(" on ")]
+    owners = find_owners(names, part)
     if len(owners) != 1:
         return None
     if sum(points for _, points in contacts) != count:
@@ -193,11 +198,7 @@ def _pick_contact(
 def _pick_box(box: Any, points: Array) -> Mask | None:
     """Return the points (m, d) in a box, its faces included; None for what is no box of numbers."""
     try:
-        corners = np.sort(np.asarray(box, dtype=float), axis=0)
+        corners = np.asarray(box, dtype=float)
     except (TypeError, ValueError):
         return None
-    if corners.shape != (2, points.shape[1]):
-        return None
-    slack = 1e-9 * np.ptp(points, axis=0).max()
-    inside = (points >= corners[0] - slack) & (points <= corners[1] + slack)
-    return np.asarray(inside.all(axis=1))
+    return find_in_box(points, corners) if corners.shape == (2, points.shape[1]) else None

@@ -102,7 +102,7 @@ def write_report(
     run = read_run(folder)
     failed = failed or {}
     heading = str(title or case.get("title") or f"Run {folder.resolve().name}")
-    sheet = _read_sheet(folder, case, run)
+    sheet = read_sheet(folder, case, run)
     pages = _choose_pages(folder, out)
 
     # Page 1 and its sketch, and the sections of what the run has told.
@@ -144,8 +144,13 @@ def write_report(
     return WrittenReport(first, error, [*pages, table, *sketches, *pictures])
 
 
-def _read_sheet(folder: Path, case: Mapping[str, Any], run: RunFolder) -> Sheet:
+def read_sheet(folder: Path, case: Mapping[str, Any], run: RunFolder) -> Sheet:
     """Return what [sheet] of the case that a run folder keeps says.
+
+    Args:
+        folder: of the run.
+        case: the tables of that case.
+        run: what ``read_run`` returned.
 
     Raises:
         InputError: for a wrong value, and for numbers that the run does not have.

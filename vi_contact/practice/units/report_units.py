@@ -21,8 +21,8 @@ _PLAIN = (1e-4, 1e7)
 class ReportUnits:
     """Name the units of a report; each is a unit of the quantity that it stands for.
 
-    A moment is written in the unit of force times metre. In plane strain, forces, moments and
-    masses are those of a metre of the body and are written so: kN/m, kN m/m, t/m.
+    A moment is written in the unit of force times metre. In plane strain, forces, moments,
+    energies and masses are those of a metre of the body and are written so: kN/m, kN m/m, t/m.
 
     Attributes:
         force: of forces and thrusts.
@@ -33,6 +33,7 @@ class ReportUnits:
         mass: of bodies.
         angle: of rotations.
         acceleration: of motions.
+        energy: of the columns of the ledger.
     """
 
     force: str = "kN"
@@ -43,6 +44,7 @@ class ReportUnits:
     mass: str = "t"
     angle: str = "rad"
     acceleration: str = "m/s²"
+    energy: str = "kJ"
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -72,6 +74,7 @@ _SI = {
     "mass": "kg",
     "angle": "rad",
     "acceleration": "m/s²",
+    "energy": "J",
 }
 # The quantity that an SI unit of a column stands for, where nothing else is said.
 _QUANTITIES = {
@@ -82,6 +85,7 @@ _QUANTITIES = {
     "kg": "mass",
     "rad": "angle",
     "m/s²": "acceleration",
+    "J": "energy",
 }
 # What is less than one (moduli, masses), or than a thousandth (others), of the usual unit is
 # written in the first of these in which it is no less than one, or in the last of them.
@@ -89,6 +93,7 @@ _SMALLER = {
     "GPa": ("MPa", "kPa", "Pa"),
     "t": ("kg",),
     "kN": ("N",),
+    "kJ": ("J",),
     "kPa": ("Pa",),
     "mm": ("µm",),
     "rad": ("µrad",),
@@ -96,7 +101,7 @@ _SMALLER = {
 _LEAST = {"modulus": 1.0, "mass": 1.0}
 _LEAST_OF_OTHERS = 1e-3
 # Quantities that are those of a metre of the body in plane strain.
-_PER_METRE = ("force", "moment", "mass")
+_PER_METRE = ("force", "moment", "mass", "energy")
 
 
 @dataclass(frozen=True)

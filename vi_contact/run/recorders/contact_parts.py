@@ -50,6 +50,7 @@ Where = Callable[[Array, Array], Mask]  # points (m, d) [m], normals (m, d) -> m
 Geometry = Any
 # of the largest singular value of the rigid modes of a part: less says nothing about a motion
 DETERMINED = 1e-9
+ROUNDING = 1e-9  # of the largest side of the contact: points so near to a box are in it
 CANCEL = 1e-6  # of the weight of a part: normals whose sum is shorter have no mean direction
 
 
@@ -378,3 +379,26 @@ def contact_summary(
     active = read("active")[:, :, 0] > 0.5
     gap = read("gap")[:, :, 0]
     return part.derive(part.sum_up(r_n, r_t, active), part.find_largest(gap, slip))
+
+
+def is_upright(part: str, history: Mapping[str, Array]) -> bool:
+    """Say whether a part of the contact stands upright: it has a height, and its thrust a level.
+
+    Args:
+        part: its name in the columns.
+        history: column -> values (rows,) of a run.
+    """
+    return bool(np.isfinite(history.get(f"level_{part}", np.nan)).any())
+
+
+def find_in_box(points: Array, box: Sequence[Sequence[float]] | Array) -> Mask:
+    """Return which points lie in a box, its faces included.
+
+    Args:
+        points: (m, d) [m].
+        box: (2, d) two opposite corners [m].
+    """
+    low, high = np.sort(np.asarray(box, dtype=float), axis=0)
+    slack = ROUNDING * np.ptp(points, axis=0).max()
+    inside = (points >= low - slack) & (points <= high + slack)
+    return np.asarray(inside.all(axis=1))

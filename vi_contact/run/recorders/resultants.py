@@ -13,7 +13,7 @@ from ...core.problem import ContactProblem
 from ...core.quantities import Unit
 from ...core.step import AXES, Columns, Report, Row, State
 from ...core.surfaces import ContactSurface
-from .contact_parts import DETERMINED, Part, Where, check_part
+from .contact_parts import DETERMINED, Part, Where, check_part, find_in_box
 
 # Quantity -> (unit, meaning).
 _MEANING: Columns = {
@@ -157,15 +157,8 @@ class Resultants:
     def _make_where(self, whole: ContactSurface) -> Where:
         """Return what picks the conditions of ``part`` out of all. Collective."""
         is_group = hasattr(self.part, "indices")
-        chosen = self._pick_in_group(whole) if is_group else self._pick_in_box(whole)
+        chosen = self._pick_in_group(whole) if is_group else find_in_box(whole.points, self.part)
         return lambda points, normals: chosen
-
-    def _pick_in_box(self, whole: ContactSurface) -> Mask:
-        """Return which of all conditions (m,) are in the box ``part``, its faces included."""
-        low, high = np.sort(np.asarray(self.part, dtype=float), axis=0)
-        slack = DETERMINED * np.ptp(whole.points, axis=0).max()
-        inside = (whole.points >= low - slack) & (whole.points <= high + slack)
-        return np.asarray(np.all(inside, axis=1))
 
     def _pick_in_group(self, whole: ContactSurface) -> Mask:
         """Return which of all conditions (m,) are in the boundary group ``part``. Collective."""

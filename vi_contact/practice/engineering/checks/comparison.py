@@ -15,12 +15,12 @@ from ....core.algebra import Array
 from ....core.arguments import check_fields
 from ....core.checks import check_word
 from ....core.quantities import RATIO, Between, Positive, Unit, read_quantities
+from ..peak_values import NEARLY, find_stretch
 from .model_facts import ModelFacts
 
 History = Mapping[str, Array]  # column -> values (rows,)
 Inputs = Mapping[str, tuple[float, str]]  # name -> (value, unit)
 NO_JUDGEMENT = "the ratio is found over expected, and no judgement"
-HIGH = 0.9  # of a peak: how long a column stays above it is told
 _RADIANS = "radians; 30 degrees are 0.5236"
 Length = Annotated[float, Positive, Unit("m")]
 Density = Annotated[float, Positive, Unit("kg/m³")]
@@ -235,13 +235,8 @@ def find_duration(t: Array, values: Array) -> tuple[float, int]:
         t: (n,) times [s].
         values: (n,), the largest of them positive.
     """
-    row = int(np.argmax(values))
-    level = HIGH * float(values[row])
-    below = np.flatnonzero(values < level)
-    before = below[below < row]
-    after = below[below > row]
-    first = int(before[-1]) + 1 if len(before) else 0
-    last = int(after[0]) - 1 if len(after) else len(values) - 1
+    first, last = find_stretch(values)
+    level = NEARLY * float(np.max(values))
 
     # The crossings of the level, between a row that is high and its neighbour that is low.
     start = float(t[first])

@@ -1,6 +1,6 @@
 """Take from the model of a run what formulas need of its friction and its bodies."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -57,14 +57,24 @@ class ModelFacts:
     def find_mu(self, part: str) -> float | None:
         """Return the coefficient of friction of a part of the contact; None if it is not known.
 
-        The part is a contact of this name, or of a group of this name. The coefficient of other
-        parts is known where all contacts have the same one.
+        The part is a contact of this name, or those of a group of this name; other parts may be of
+        any contact. The coefficient is known where all of these contacts have the same one.
         """
-        for name, mu in self.friction.items():
-            if part == name or part in name.split(" on "):
-                return mu
-        values = set(self.friction.values())
+        owners = find_owners(list(self.friction), part) or list(self.friction)
+        values = {self.friction[name] for name in owners}
         return values.pop() if len(values) == 1 else None
+
+
+def find_owners(names: Sequence[str], part: str) -> list[str]:
+    """Return which contacts a part is: the one of this name, else those of a group of this name.
+
+    Args:
+        names: of all contacts; a contact of two groups is called "one on other".
+        part: a name.
+    """
+    return [name for name in names if part == name] or [
+        name for name in names if part in name.split(" on ")
+    ]
 
 
 def _read_number(value: object) -> float | None:
