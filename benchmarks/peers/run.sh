@@ -10,7 +10,8 @@ set -uo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/../../install/setup.sh"
 vi_setup
 folder=$vi_root/benchmarks/peers
-unset PYTHONDONTWRITEBYTECODE  # or the modules of a clone are compiled anew in every row, and those of an installed program are not
+# Else the modules of a clone are compiled anew in every row, and those of an installed program not.
+unset PYTHONDONTWRITEBYTECODE
 export PYTHONPATH=$vi_root PETSC_OPTIONS=-no_signal_handler NUMBA_NUM_THREADS=1 NGS_NUM_THREADS=1
 json= together=
 while [ $# -gt 0 ]; do

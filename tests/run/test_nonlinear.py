@@ -15,7 +15,7 @@ from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.step import Report
 from vi_contact.layer.contact_law import contact_layer
 from vi_contact.layer.scheme import BoundaryLayer
-from vi_contact.run.stepper import Stepper, Trial
+from vi_contact.run.stepper import Stepper
 
 ELEMENTS = 40
 
@@ -127,9 +127,10 @@ def test_impact_laws_act_on_a_chain_of_cubic_springs(law: Any) -> None:
     stiffest = 0.0
     struck = 0
     for _ in range(250):
-        report = stepper.attempt(2e-3).report
+        trial = stepper.attempt(2e-3)
+        report = trial.report
         row = ledger.row(report)
-        stepper.accept(Trial(report, 2e-3))
+        stepper.accept(trial)
         assert report.certificate.worst <= 1e-9
         if report.new.active[0] and not report.old.active[0]:
             struck += 1

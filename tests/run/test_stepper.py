@@ -40,6 +40,23 @@ def test_a_stepper_makes_the_steps_of_a_march(scheme: Any) -> None:
 
 
 @pytest.mark.serial
+def test_a_first_trial_is_accepted_whose_massless_nodes_were_out_of_equilibrium() -> None:
+    """The trapezoidal rule brings them there before its first step: u is not the one that the
+    stepper stands at."""
+    K = [[200.0, -100.0], [-100.0, 200.0]]
+    system = vc.system_from_arrays(
+        [0.0, 1.0], None, K, coordinates=[[0.0], [1.0]], load=[3.0, 0.0], v0=[0.0, 1.0]
+    )
+    foot = vc.contact_points(system, [0], [1.0], gap0=[0.02])
+    problem = vc.ContactProblem(system, foot, mass=vc.ConsistentMass())
+    choice: dict[str, Any] = {"scheme": vc.Trapezoidal(), "solver": vc.Condensed()}
+    stepper = vc.Stepper(problem, **choice)
+    for state, _ in vc.march(problem, **choice, dt=DT, steps=20):
+        assert difference(stepper.accept(stepper.attempt(DT)), state) == 0.0
+    assert state.active.any()
+
+
+@pytest.mark.serial
 def test_factors_are_kept_by_the_size_of_the_step() -> None:
     stepper = vc.Stepper(shaken(), scheme=HALF, solver=vc.Condensed())
     stepped(stepper, [DT, 0.5 * DT, DT, 0.5 * DT])

@@ -46,10 +46,13 @@ class Trial:
     Attributes:
         report: what happened in it.
         dt: its length [s].
+        start: where the stepper stood. The first step of a scheme begins with ``report.old``, which
+            the scheme may have made of it, as with massless nodes in equilibrium.
     """
 
     report: Report
     dt: float
+    start: State
 
     @property
     def state(self) -> State:
@@ -149,7 +152,7 @@ class Stepper:
             oldest = next(iter(self.prepared))
             del self.prepared[oldest]
             self.joints.pop(oldest, None)
-        return Trial(self._attempt(float(dt)), float(dt))
+        return Trial(self._attempt(float(dt)), float(dt), self.state)
 
     def accept(self, trial: Trial) -> State:
         """Go on from the end of a trial, and return the state there.
@@ -161,8 +164,8 @@ class Stepper:
             InputError: a trial from another state.
         """
         instance("Stepper.accept", "trial", trial, Trial, "give what attempt has returned")
-        start = trial.report.old
-        if start.t != self.state.t or start.k != self.state.k or start.u is not self.state.u:
+        start = trial.start
+        if start is not self.state:
             raise InputError(
                 f"Stepper.accept: the trial starts at t = {start.t:g} s, step {start.k}, and the "
                 f"stepper stands at t = {self.state.t:g} s, step {self.state.k}: attempt a step "
