@@ -198,9 +198,9 @@ def test_a_strip_is_peeled_with_linear_softening() -> None:
     problem, measure = strip(135, "linear")
     stages = np.linspace(5e-4, 6.9447e-3, 14)
     *_, state = vc.quasi_static(problem, stages, tolerance=1e-3)
-    w, P = measure(state, stages[-1])
+    w, force = measure(state, stages[-1])
     assert w == pytest.approx(6.94005e-3, rel=2e-4)
-    assert P == pytest.approx(46.37179, rel=0.01)
+    assert force == pytest.approx(46.37179, rel=0.01)
 
 
 @pytest.mark.parametrize(

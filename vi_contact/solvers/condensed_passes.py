@@ -70,8 +70,8 @@ class CondensedPasses:
 
         Args:
             condensed: A, condensed onto the contact unknowns.
-            small: (step, free motion, reactions to begin with) -> (r, gap and minus slip, closed, sticks, held, values,
-                iterations) of all ranks.
+            small: (step, free motion, reactions to begin with) -> (r, gap and minus slip, closed,
+                sticks, held, values, iterations) of all ranks.
             flexibility: G, with the compliance.
             compliance: of the contact unknowns, over the scale.
             surface: the contact conditions.
