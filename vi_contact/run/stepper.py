@@ -29,6 +29,7 @@ from ..core.stage import Stage, average, complete, make_matrix, pose
 from ..core.state_checks import initial_state
 from ..core.step import Report, Scheme, Solver, State, StepProblem
 from ..solvers.certified import TOLERANCE, Certified, CertifiedSolver
+from ..solvers.door import refuse_nan
 from ..solvers.joints import JointSolver
 from ..solvers.nonlinear import NonlinearSolver
 from . import joint_steps
@@ -286,6 +287,7 @@ class Stepper:
             self.prepared[dt] = (A, whole)
             self.joints[dt] = JointSolver(whole.solve, whole.first, method.tolerance)
         base = pose(problem, stage, self.prepared[dt][0])
+        refuse_nan(base, lambda: problem.equations)
         step, certified = self.joints[dt].solve(base, pose_joint(problem, state, dt))
         return replace(stage, bound=stage.bound - step.joint.shift), step, certified
 

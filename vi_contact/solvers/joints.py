@@ -138,7 +138,10 @@ class JointSolver:
         for count in range(1, MOST + 1):
             step = joint.apply(base, used)
             push = _find_push(step, base, small.width)
-            end = small.make(step, push, end)
+            try:
+                end = small.make(step, push, end)
+            except StepFailure:  # whole steps have methods to escalate to
+                return self._solve_whole(base, joint, used)
             g1, s1 = joint.end_at(
                 surface.mine(end.gap), surface.mine(end.slip), surface.mine(end.closed)
             )
