@@ -13,6 +13,7 @@ from mpi4py import MPI
 import vi_contact as vc
 from vi_contact import fem, laws
 from vi_contact.core.errors import InputError
+from vi_contact.meshes import BlockMesh
 
 MIDPOINT = vc.ZienkiewiczWoodTaylor()
 STONE = vc.LinearElastic(E=2e10, nu=0.2, rho=2400.0)
@@ -210,3 +211,61 @@ def test_a_rupture_runs_along_a_fault(comm: Any) -> None:
     assert row["loss_rubbing"] == pytest.approx(np.sum(surface.weights * work), rel=1e-7)
     both = row["loss_contact"] + row["loss_friction"]
     assert row["loss_rubbing"] - row["work_prestress"] == pytest.approx(both, rel=1e-9)
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize(
+    "joint",
+    [
+        laws.Joint(mu=0.6, cohesion=2e5, tension=1e5, energy=20.0),
+        laws.SlipWeakening(static=0.6, kinetic=0.3, distance=2e-3),
+    ],
+    ids=lambda joint: type(joint).__name__,
+)
+def test_a_block_in_space_breaks_loose(comm: Any, joint: Any) -> None:
+    """Pushed along both tangents: certified, the ledger closed, and the same by both solvers."""
+    mesh, tags = fem.build_mesh(BlockMesh(lengths=(4.0,) * 3, divisions=(3,) * 3), comm)
+    push = fem.Traction(tags["left"], (3e5, 0.0, 1.5e5), history=lambda t: min(t / 0.1, 1.0) ** 2)
+    system = fem.assemble(
+        mesh,
+        vc.LinearElastic(E=1e10, nu=0.2, rho=2400.0),
+        loads=[fem.BodyForce((0.0, -24000.0, 0.0)), push],
+        damping=vc.Rayleigh(alpha=0.0, beta=1e-3),
+    )
+    surface = fem.contact_surface(system, tags["bottom"])
+    problem = vc.ContactProblem(system, surface, joint=joint, mass=vc.ConsistentMass())
+    rest = vc.static_equilibrium(problem, tolerance=1e-7)
+    rubbed = []
+    for solver in (vc.Condensed(), vc.Iterative()):
+        run = vc.simulate(
+            problem,
+            scheme=MIDPOINT,
+            solver=solver,
+            dt=2e-3,
+            t_end=0.14,
+            state=rest,
+            progress=False,
+        )
+        history = run.history
+        assert history["certificate"].max() < 1e-9
+        assert np.abs(history["energy_defect"]).max() < 1e-9 * history["work_input"].max()
+        assert run.state.memory["joint_way"].min() > 2e-3
+        both = history["loss_contact"] + history["loss_friction"]
+        assert np.abs(sum_of_parts(history) - both).max() < 1e-9 * np.abs(both).max()
+        rubbed.append(history["loss_rubbing"][-1])
+    assert rubbed[1] == pytest.approx(rubbed[0], rel=1e-7)
+
+
+@pytest.mark.serial
+def test_mortar_and_node_to_node_rupture_alike(comm: Any) -> None:
+    """The largest slip on matching meshes, which the two take from the same forces, to 1e-9."""
+    slips = []
+    for matching in (fem.NodeToNode(), fem.DualMortar()):
+        problem = fault(comm, 1000.0, matching)
+        stepper = vc.Stepper(problem, scheme=MIDPOINT, solver=vc.Condensed())
+        for _ in range(20):
+            trial = stepper.attempt(0.08)
+            assert trial.report.certificate.worst < 1e-9
+            stepper.accept(trial)
+        slips.append(stepper.state.memory["joint_way"].max())
+    assert slips[1] == pytest.approx(slips[0], rel=1e-9)

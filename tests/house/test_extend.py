@@ -70,7 +70,7 @@ def printed(folder: Path) -> dict[str, str]:
 
 def test_examples_print_what_the_guide_says(printed: dict[str, str]) -> None:
     files = [file for _, file, _ in BLOCKS]
-    assert list(printed) == ["scheme.py", "friction.py", "recorder.py", "foam.py"]
+    assert list(printed) == ["scheme.py", "friction.py", "glue.py", "recorder.py", "foam.py"]
     for file, found in printed.items():
         language, _, said = BLOCKS[files.index(file) + 1]
         assert language == "text" and found == said != ""

@@ -52,6 +52,7 @@ def tear(dt: float, opening: float, **joint: Any) -> tuple[float, float, dict[st
     return lost, float(x[top]), last, float(run.history["certificate"].max())
 
 
+@pytest.mark.promise("theory/softening_joints.md", "the motion is of order 2")
 @pytest.mark.parametrize("opening", TORN)
 def test_a_mass_is_torn_off_by_order_two(opening: float) -> None:
     """Time of loss and first maximum within three times what 1 ms shows, and order 2 down to it."""
@@ -61,6 +62,7 @@ def test_a_mass_is_torn_off_by_order_two(opening: float) -> None:
     assert tear(1e-3, opening)[0] == pytest.approx(exact_loss, abs=4e-5)
 
 
+@pytest.mark.promise("theory/softening_joints.md", "When a joint is lost, `loss_fracture` is")
 @pytest.mark.parametrize("dt", [7e-3, 4e-3, 1e-3])
 def test_the_fracture_energy_is_exact_at_every_step(dt: float) -> None:
     """All is lost: G_f w, to round-off; and the parts add up to the contact column."""
@@ -116,6 +118,7 @@ def test_an_opened_joint_unloads_to_the_origin() -> None:
     assert stored[still].max() > 5.0 * stored[still].min()
 
 
+@pytest.mark.promise("theory/softening_joints.md", "a strength that is one per cent wrong")
 def test_a_wrong_strength_is_caught_by_law_alone() -> None:
     """A step that is solved with 1 % less strength satisfies all other conditions to round-off."""
     problem = torn_mass(opening=1e-3)
@@ -198,9 +201,9 @@ def test_a_strip_is_peeled_with_linear_softening() -> None:
     problem, measure = strip(135, "linear")
     stages = np.linspace(5e-4, 6.9447e-3, 14)
     *_, state = vc.quasi_static(problem, stages, tolerance=1e-3)
-    w, P = measure(state, stages[-1])
+    w, force = measure(state, stages[-1])
     assert w == pytest.approx(6.94005e-3, rel=2e-4)
-    assert pytest.approx(46.37179, rel=0.01) == P
+    assert force == pytest.approx(46.37179, rel=0.01)
 
 
 @pytest.mark.parametrize(
@@ -312,6 +315,25 @@ def test_lambda_falls_with_the_square_of_dt() -> None:
 def test_bad_joints_are_refused(values: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
         laws.Joint(**values)
+
+
+@pytest.mark.parametrize(("water", "slides"), [(0.0, False), (0.5, True)])
+def test_friction_does_not_feel_the_water(water: float, slides: bool) -> None:
+    """1 N presses, 0.4 N pushes along, mu is 0.6: the block stands dry, and slides where half of
+    the pressure is water's; the total reaction is 1 N, and the rest of 0.4 N accelerates it."""
+    push = 0.4
+    system = vc.system_from_arrays(
+        np.ones(2), None, np.diag([1e-9, 1e6]), coordinates=[[0.0, 0.0]], load=[push, -1.0]
+    )
+    surface = vc.contact_points(system, [0], [[0.0, -1.0]])
+    joint = laws.Joint(mu=0.6, water=water / surface.weights[0])
+    problem = vc.ContactProblem(system, surface, joint=joint, mass=vc.ConsistentMass())
+    *_, (state, report) = march(problem, 1e-2, 1.0)
+    assert report.certificate.worst < 1e-9
+    assert state.r_n[0] == pytest.approx(1.0, abs=1e-12)
+    speed = abs(float(problem.cartesian(state.v)[0]))
+    exact = push - 0.6 * (1.0 - water) if slides else 0.0
+    assert speed == pytest.approx(exact, abs=1e-6)
 
 
 def test_bad_values_of_other_laws_are_refused() -> None:

@@ -18,7 +18,7 @@ SIGMA, KINETIC, DISTANCE = 120e6, 0.525, 0.5  # Pa, -, m
 HALF, DEPTH = 18e3, 9e3  # m of each half plane
 
 
-def fault(comm: Any, h: float) -> vc.ContactProblem:
+def fault(comm: Any, h: float, matching: Any = None) -> vc.ContactProblem:
     """The fault, 36 km long with its middle at x = HALF, on squares of edge h [m]."""
     rock = BlockMesh(
         lengths=(2.0 * HALF, DEPTH), divisions=(round(2.0 * HALF / h), round(DEPTH / h))
@@ -28,7 +28,7 @@ def fault(comm: Any, h: float) -> vc.ContactProblem:
     upper, lower = blocks.interface
     sides = ("lower_left", "lower_right", "lower_bottom", "upper_left", "upper_right", "upper_top")
     system = fem.assemble(mesh, ROCK, dashpots=[fem.Dashpots(tags[side]) for side in sides])
-    surface = fem.contact_pair(system, tags[upper], tags[lower])
+    surface = fem.contact_pair(system, tags[upper], tags[lower], matching=matching)
     joint = laws.SlipWeakening(
         static=lambda x: np.where(np.abs(x[:, 0] - HALF) < 10e3, 0.677, 1e4),
         kinetic=KINETIC,

@@ -50,6 +50,8 @@ class Joint(OfPoints):
         opening: dc [m], at which nothing is left; of a joint without tension, the slip.
         softening: "linear", "brittle" or "constant".
         dilatancy: tan(psi), by how much slip lifts the joint.
+        water: pressure of the water in the joint [Pa], given and kept. It presses both faces, and
+            friction does not feel it: reactions are total ones, effective ones less by it.
         prestress: stresses before anything moves; None for none.
         implicit: False takes the strength that is there before each step.
     """
@@ -61,6 +63,7 @@ class Joint(OfPoints):
     opening: Annotated[PositiveByPoint | None, Unit("m"), "the opening"] = None
     softening: Literal["linear", "brittle", "constant"] = "linear"
     dilatancy: Annotated[NotNegativeByPoint, RATIO, "the dilatancy tan(psi)"] = 0.0
+    water: Annotated[NotNegativeByPoint, Unit("Pa"), "the water pressure"] = 0.0
     prestress: Prestress | None = None
     implicit: bool = True
 
@@ -213,7 +216,7 @@ class Joint(OfPoints):
         cohesion = self.spread("cohesion", count)
         if not _is_zero(self.cohesion):
             cohesion = cohesion * self._mean_left(committed["kappa"], last, dc)
-        return Strength(tension, cohesion, self.spread("mu", count), np.zeros(count))
+        return Strength(tension, cohesion, self.spread("mu", count), self.spread("water", count))
 
     def slope(
         self, committed: Committed, g0: Array, g1: Array, s0: Array, s1: Array, dt: float

@@ -29,6 +29,7 @@ from ..core.stage import Stage, average, complete, make_matrix, pose
 from ..core.state_checks import initial_state
 from ..core.step import Report, Scheme, Solver, State
 from ..solvers.certified import TOLERANCE, CertifiedSolver
+from ..solvers.door import refuse_nan
 from ..solvers.joints import JointSolver
 from ..solvers.nonlinear import NonlinearSolver
 from . import joint_steps
@@ -215,6 +216,7 @@ class Stepper:
         if problem.joint is None:
             certified = solver.solve(step)
         else:
+            refuse_nan(step, lambda: problem.equations)
             step, certified = self.joints[dt].solve(step, pose_joint(problem, state, dt))
             stage = replace(stage, bound=stage.bound - step.joint.shift)
         answer = complete(stage, step, certified.result)

@@ -138,7 +138,10 @@ class JointSolver:
         for count in range(1, MOST + 1):
             step = joint.apply(base, used)
             push = _find_push(step, base, small.width)
-            end = small.make(step, push, end)
+            try:
+                end = small.make(step, push, end)
+            except StepFailure:  # whole steps have methods to escalate to
+                return self._solve_whole(base, joint, used)
             g1, s1 = joint.end_at(
                 surface.mine(end.gap), surface.mine(end.slip), surface.mine(end.closed)
             )
@@ -149,7 +152,7 @@ class JointSolver:
             lag = compare(surface, there, used, friction, used.mu * r_n, force)
             if lag <= AIM * self._tolerance:
                 self.passes.append(count)
-                return self._finish(step, small, push, end)
+                return self._finish(step, small, push, end, count)
             part = min(1.0, 2.0 * part) if lag < least else 0.5 * part
             least = min(least, lag)
             correction = correct(joint, end, small, (g1, s1), there, used, step.scale)
@@ -162,7 +165,7 @@ class JointSolver:
         raise self._refuse(base, lag)
 
     def _finish(
-        self, step: StepProblem, small: CondensedPasses, push: Array, end: PassEnd
+        self, step: StepProblem, small: CondensedPasses, push: Array, end: PassEnd, count: int
     ) -> tuple[StepProblem, Certified]:
         """Return the answer of the last pass; a whole step where it is not certified. Collective.
 
@@ -171,8 +174,9 @@ class JointSolver:
             small: which has made it.
             push: its further forces.
             end: where it has led.
+            count: how many passes there were, which are the iterations of the step.
         """
-        result = small.finish(push, end)
+        result = replace(small.finish(push, end), iterations=count)
         certificate = kkt_residual(step, result)
         if certificate.worst <= self._tolerance:
             return step, Certified(result, certificate, escalated=False)
@@ -200,7 +204,7 @@ class JointSolver:
             self._rates = RatePasses(small)
         step, push, end, count = self._rates.solve(base, joint)
         self.passes.append(count)
-        return self._finish(step, small, push, end)
+        return self._finish(step, small, push, end, count)
 
     def _tell_snap(self, base: StepProblem, *, told: bool) -> bool:
         """Log, once a step on rank 0, that it has several answers; return True: it is told.
