@@ -403,11 +403,11 @@ def tell_corners(space: FemSpace, name: str, nodes: Nodes, slots: Indices, angle
         angle: the feature angle [rad].
     """
     # the first row of each node with several, where it turns and where it faces several partners
-    turning = []
-    shared = []
+    turning: list[int] = []
+    shared: list[int] = []
     for rows in group_same_nodes(nodes.numbers):
         is_flat = np.array_equal(nodes.normals[rows], nodes.normals[rows[:1]].repeat(len(rows), 0))
-        (shared if is_flat else turning).append(rows[0])
+        (shared if is_flat else turning).append(int(rows[0]))
     turns = f"turns by more than {np.degrees(angle):.4g} degrees"
     for what, first, each in (
         (turns, turning, "face"),
