@@ -22,6 +22,7 @@ from vi_contact.core.errors import InputError, ViContactError
 from vi_contact.core.ledger import energy_balance
 from vi_contact.core.problem import ContactProblem
 from vi_contact.meshes import BlockMesh, Blocks
+from vi_contact.run.damping import first_modes
 
 COMM = MPI.COMM_WORLD
 MU = 0.6
@@ -489,3 +490,104 @@ def test_walls_that_slide_past_a_corner():
     joined = fem.joined_surfaces(*(part.moving(along=lambda t: along) for part in parts))
     problem = ContactProblem(system, joined, friction=vc.Coulomb(0.3))
     assert problem.surface.slide(0.0) == pytest.approx(np.full((joined.count, 1), along))
+
+
+# What else such surfaces do
+# --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("kind", ["springs", "held", "frictionless corners"])
+def test_other_conditions_of_a_wall(kind):
+    """Joints on springs, joints that may pull, and nodes in several pairs that slide freely: 1 MPa
+    in the beds all the same, and certified steps."""
+    system, problem = bond()
+    surface = {
+        "springs": lambda s: s.on_springs(1e10),
+        "held": lambda s: s.bilateral_everywhere(),
+        "frictionless corners": lambda s: s.with_frictionless_corners(),
+    }[kind](problem.surface)
+    problem = ContactProblem(system, surface, friction=vc.Coulomb(MU))
+    state = vc.static_equilibrium(problem)
+    upright = np.abs(surface.normals[:, 1]) > 0.5
+    pressure = state.r_n / surface.weights
+    assert pressure[upright] == pytest.approx(np.full(upright.sum(), 1e6), rel=1e-7)
+    reports = [report for _, report in vc.march(problem, dt=5e-4, steps=5)]
+    assert max(report.certificate.worst for report in reports) <= 1e-9
+    if kind == "frictionless corners":
+        corners = np.concatenate(surface.corners)
+        assert all(np.abs(report.new.r_t[corners]).max() == 0.0 for report in reports)
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("simplices", [False, True])
+def test_stones_of_second_order(simplices):
+    """A stone on two stones by elements of degree 2, with the joint below: 1 MPa everywhere."""
+    blocks = {
+        "up": BlockMesh(
+            lengths=(2.0, 0.5), divisions=(4, 2), corner=(0.0, 1.0), simplices=simplices
+        ),
+        "a": BlockMesh(divisions=(2, 2), simplices=simplices),
+        "b": BlockMesh(divisions=(2, 2), corner=(1.0, 0.0), simplices=simplices),
+    }
+    mesh, tags = fem.build_mesh(Blocks(blocks), COMM)
+    system = fem.assemble(
+        mesh,
+        PLAIN,
+        degree=2,
+        clamped=[tags["a_bottom"], tags["b_bottom"]],
+        prescribed=fem.Prescribed(tags["up_left"], components=(0,)),
+        loads=fem.Traction(tags["up_top"], (0.0, -1e6)),
+    )
+    bed = fem.contact_pair(system, tags["up_bottom"], several(mesh, tags, "a_top", "b_top"))
+    surface = fem.joined_surfaces(bed, fem.contact_pair(system, tags["a_right"], tags["b_left"]))
+    problem = ContactProblem(system, surface, friction=vc.Coulomb(0.5))
+    state = vc.static_equilibrium(problem)
+    pressure = state.r_n / surface.weights
+    assert pressure[: bed.total] == pytest.approx(np.full(bed.total, 1e6), rel=1e-8)
+    assert np.abs(pressure[bed.total :]).max() < 1e-2
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize(
+    "scheme",
+    [
+        vc.Midpoint(),
+        vc.SS22(0.6, 0.7),
+        vc.ZienkiewiczWoodTaylor(0.6),
+        vc.ContactStabilisedNewmark(),
+    ],
+    ids=lambda scheme: type(scheme).__name__,
+)
+def test_conditions_as_traces_are_the_same_conditions(scheme):
+    """Two stones, one on the other, where every condition can have an unknown of its own: as traces
+    they give the same motion, forces and first periods."""
+    blocks = {"a": BlockMesh(divisions=(4, 4)), "b": BlockMesh(divisions=(4, 4), corner=(0.0, 1.0))}
+    mesh, tags = fem.build_mesh(Blocks(blocks), COMM)
+    system = fem.assemble(
+        mesh,
+        STONE,
+        clamped=tags["a_bottom"],
+        loads=fem.BodyForce((0.0, -2000.0 * GRAVITY)),
+    )
+    surface = fem.contact_pair(system, tags["b_bottom"], tags["a_top"])
+    shaken = vc.Harmonic(30.0, 9.0, direction=(1.0, 0.4))
+    runs = []
+    for part in (surface, surface.with_own_laws()):
+        problem = ContactProblem(system, part, friction=vc.Coulomb(0.4), excitation=shaken)
+        reports = [report for _, report in vc.march(problem, dt=5e-4, steps=40, scheme=scheme)]
+        runs.append((problem, reports))
+    (one, first), (other, second) = runs
+    assert one.surface.traces is None and other.surface.traces is not None
+    size = max(report.new.r_n.max() for report in first)
+    for a, b in zip(first, second, strict=True):
+        assert np.abs(a.new.r_n - b.new.r_n).max() < 1e-8 * size
+        assert np.abs(a.new.r_t - b.new.r_t).max() < 1e-8 * size
+    u, v = (problem.cartesian(run[-1].new.u) for problem, run in runs)
+    assert np.abs(u - v).max() < 1e-9 * np.abs(u).max()
+    # stiff springs hold traces, a million times as stiff as the stones
+    assert first_modes(other).periods == pytest.approx(first_modes(one).periods, rel=1e-5)
+    for name in ("contact_pressure", "contact_gap"):
+        functions = [fem.as_function(problem, run[-1].new, name).x.array for problem, run in runs]
+        scale = max(np.abs(functions[0]).max(), 1e-9 * np.abs(u).max())
+        assert np.abs(functions[0] - functions[1]).max() < 1e-7 * scale

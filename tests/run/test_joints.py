@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from joints import CRITICAL, MASS, PRESSURE, STRENGTH, slider, strip, torn_mass
+from joint_cases import CRITICAL, MASS, PRESSURE, STRENGTH, slider, strip, torn_mass
 from marched_chain import difference
 
 import vi_contact as vc

@@ -435,17 +435,20 @@ class ContactSurface:
     def with_frictionless_corners(self) -> "ContactSurface":
         """Let nodes with several conditions slide freely over their faces beside friction.
 
-        Otherwise such nodes are refused beside friction: what a node rubs on one face is a force
-        across the other, which the conditions, each a bound on one unknown, do not hold. In space
-        it still rubs along its edge, with the normal force of its first condition (of one group:
-        that of the face with the lowest node numbers). Collective.
+        Otherwise each of their conditions has the friction of its own face (``with_own_laws``), and
+        all conditions of the surface are traces. In space such a node still rubs along its edge,
+        with the normal force of its first condition (of one group: that of the face with the lowest
+        node numbers); where conditions are traces already it does not. Collective.
         """
         corners = total(self.comm, len(self.corners))
         if corners and self.comm.rank == 0:
             log.info(
                 "%d contact nodes with several contact directions slide without friction", corners
             )
-        return replace(self, frictionless_corners=True)
+        traces = self.traces
+        if traces is not None and self.corners:
+            traces = traces.without_tangents(np.concatenate(self.corners))
+        return replace(self, frictionless_corners=True, traces=traces)
 
     @check_arguments
     def on_springs(

@@ -93,6 +93,13 @@ class Traces:
         unknowns = self.comm.sum(numbers).astype(np.int64)
         return replace(self, unknowns=unknowns, own=own)
 
+    def without_tangents(self, rows: Indices) -> "Traces":
+        """Return the same traces, of which some conditions (rows) have no tangents."""
+        width = self.moves.shape[1]
+        keep = np.ones(self.tangential.shape[0])
+        keep[(rows[:, None] * width + np.arange(width)).ravel()] = 0.0
+        return replace(self, tangential=_drop_zeros(sp.diags([keep], [0]) @ self.tangential))
+
     def read_here(self, *, frictional: bool) -> Indices:
         """Return the unknowns of this rank that a condition of any rank reads. Collective.
 

@@ -19,6 +19,7 @@ import ufl
 from ...core.algebra import Array, Indices, Mask, from_each
 from ...core.checks import describe_point, number
 from ...core.errors import InputError
+from ...core.surfaces import group_same_nodes
 from ...meshes.rows import number_alike, number_parts
 from .. import compat
 from ..body.space import FemSpace
@@ -401,19 +402,29 @@ def tell_corners(space: FemSpace, name: str, nodes: Nodes, slots: Indices, angle
         slots: their numbers among those of all ranks.
         angle: the feature angle [rad].
     """
-    _, first, counts = np.unique(nodes.numbers, return_index=True, return_counts=True)
-    rows = first[counts > 1]
-    numbers, points = gather_rows(space.comm, slots[rows], nodes.points[rows])
-    if space.comm.rank == 0 and len(numbers):
-        some = points[np.argsort(numbers)[:NAMED]]
-        places = ", ".join(describe_point(point) for point in some)
-        if len(numbers) > NAMED:
-            places += ", …"
-        log.info(
-            "'%s' turns by more than %.4g degrees at %d contact nodes, which have one condition "
-            "for every face: %s",
-            name,
-            np.degrees(angle),
-            len(numbers),
-            places,
-        )
+    # the first row of each node with several, where it turns and where it faces several partners
+    turning: list[int] = []
+    shared: list[int] = []
+    for rows in group_same_nodes(nodes.numbers):
+        is_flat = np.array_equal(nodes.normals[rows], nodes.normals[rows[:1]].repeat(len(rows), 0))
+        (shared if is_flat else turning).append(int(rows[0]))
+    turns = f"turns by more than {np.degrees(angle):.4g} degrees"
+    for what, first, each in (
+        (turns, turning, "face"),
+        ("faces several bodies", shared, "of them"),
+    ):
+        own = np.array(first, dtype=np.int64)
+        numbers, points = gather_rows(space.comm, slots[own], nodes.points[own])
+        if space.comm.rank == 0 and len(numbers):
+            some = points[np.argsort(numbers)[:NAMED]]
+            places = ", ".join(describe_point(point) for point in some)
+            if len(numbers) > NAMED:
+                places += ", …"
+            log.info(
+                "'%s' %s at %d contact nodes, which have one condition for every %s: %s",
+                name,
+                what,
+                len(numbers),
+                each,
+                places,
+            )

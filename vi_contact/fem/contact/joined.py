@@ -25,15 +25,16 @@ def joined_surfaces(*surfaces: ContactSurface) -> ContactSurface:
     """Return one surface with the conditions of all, in the order given.
 
     A node that is on several of them, at the edge of a channel, has a condition for each, at any
-    angle between them. Beside friction such nodes are refused unless they may slide freely
-    (``with_frictionless_corners``); in space they rub along the edge then, with the normal force of
-    the first of them: name the surface that carries the body first. A node of side 2 of a pair may
-    touch an obstacle, but not be on side 1 of another pair.
+    angle between them. Beside friction it rubs on all its faces, unless it may slide freely
+    (``with_frictionless_corners``); in space it rubs along the edge then, with the normal force of
+    the first of them: name the surface that carries the body first. A node may also be in several
+    pairs, on side 1 of one and on side 2 of another, or face several bodies along one direction:
+    its conditions are traces then (``core.traces``), which ``Condensed`` solves.
 
     Raises:
-        InputError: surfaces of different systems; directions of a node that are parallel (a
-            boundary or a pair listed twice) or depend on one another; a node on side 1 of one pair
-            and side 2 of another.
+        InputError: surfaces of different systems; a boundary or a pair that is listed twice, or a
+            pair both ways; directions of a node that depend on one another though it faces one
+            body.
     """
     ours = [surface for surface in surfaces if isinstance(surface, FemSurface)]
     if (

@@ -18,6 +18,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from ...core.algebra import Array, Mask, freeze
 from ...core.collective import ask_limit, ask_slope
@@ -72,11 +73,18 @@ class CondensedFriction:
         if surface.traces is None:
             self._small: Any = method.prepare(self.delassus, bilateral)
         else:
+            # What a spring carries shows in its length, as if it were an unknown of its own.
+            soft = surface.everywhere(surface.compliance) > 0.0
+            rows = d * np.flatnonzero(soft)
+            lengths = sp.csr_matrix(
+                (np.ones(len(rows)), (rows, np.arange(len(rows)))), shape=(d * len(soft), len(rows))
+            )
+            B = sp.csr_matrix(sp.hstack([surface.traces.every, lengths]))
             self._small = Hyperstatic(
                 method,
                 self.delassus,
                 bilateral,
-                rings=find_rings(surface.traces.every, condensed.movable, d),
+                rings=find_rings(B, condensed.movable, d),
                 weights=surface.everywhere(surface.weights),
                 movable=condensed.movable,
             )

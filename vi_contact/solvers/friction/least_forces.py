@@ -4,7 +4,8 @@ Displacements and Bᵀr are unique on a ring, r is not (``rings``). Of all react
 displacements, with the states that these have, that one is taken with the least sum
 
     Σ |r|²/weight   with   Bᵀr kept,   r = 0 where the gap is open,
-    r_n >= 0 and |r_t| <= cohesion + slope r_n where it is closed and sticks,
+    r_n >= 0 and |r_t| <= cohesion + slope r_n where it is closed and sticks (a held condition
+    that pulls stays as it is),
     r_t along the slip, of that size, where it slips
 
 so that equal stones press alike, mirror images give mirror forces, turned ones turned forces, and
@@ -80,7 +81,9 @@ def split_least(r: Array, ring: Ring, states: States, weights: Array, movable: M
     identity = np.eye(c * d)
     fixed = [ring.B.T * (1.0 / max(max_abs(ring.B), TINY))]
     fixed.append(identity[~movable.ravel()])
-    fixed.append(identity[places[~states.closed].ravel()])
+    # A held condition that pulls has no friction: it stays one that pulls.
+    pulls = states.bilateral & (states.slope > 0.0) & (r[:, 0] <= 0.0)
+    fixed.append(identity[places[~states.closed | pulls].ravel()])
     for i in np.flatnonzero(states.closed & ~states.stick):
         for k in range(d - 1):
             row = identity[places[i, 1 + k]].copy()
@@ -98,10 +101,10 @@ def split_least(r: Array, ring: Ring, states: States, weights: Array, movable: M
 
     # Inequalities a·s >= b: those of normal forces, and half planes of disks. That r itself is
     # allowed but for rounding makes all b <= 0.
-    pressed = states.closed & ~states.bilateral
+    pressed = states.closed & ~pulls & ~(states.bilateral & (states.slope == 0.0))
     a = [ways[places[pressed, 0]]]
     b = [-r[pressed, 0]]
-    sticking = np.flatnonzero(states.closed & states.stick & (movable[:, 1:].any(axis=1)))
+    sticking = np.flatnonzero(states.closed & states.stick & ~pulls & movable[:, 1:].any(axis=1))
     if d == 2:  # disks are intervals
         for sign in (1.0, -1.0):
             more = _cut(r, ways, places, states, sticking, np.full((len(sticking), 1), sign))
