@@ -1,5 +1,5 @@
-"""Bodies that yield beside exact answers: a plastic wave in a slab that strikes a wall, a tube under
-pressure, a punch on clay, a plate of soil under a press, and earth pressure on a smooth wall."""
+"""Bodies that yield beside exact answers: a plastic wave in a slab that strikes a wall, a tube
+under pressure, a punch on clay, a plate of soil under a press, earth pressure on a smooth wall."""
 
 from __future__ import annotations
 

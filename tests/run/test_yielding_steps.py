@@ -12,13 +12,14 @@ import pytest
 from yielding_cases import LAWS, SOIL, STEEL, step_of, throw
 
 import vi_contact as vc
-from vi_contact import fem
+from vi_contact import fem, soil
 from vi_contact.core.algebra import largest
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.internal import MATERIAL
 from vi_contact.core.surfaces import empty_surface
 from vi_contact.laws import ConsistentMass, Iwan, MohrCoulomb
 from vi_contact.meshes.block import BlockMesh
+from vi_contact.meshes.two_blocks import TwoBlocks
 from vi_contact.schemes import SS22, Houbolt, MoreauJean
 from vi_contact.solvers import Iterative, Volume
 
@@ -359,3 +360,64 @@ def test_histories_of_linear_bodies_have_no_plastic_loss(comm: Any) -> None:
     linear = replace(problem, system=problem.system.changed(internal=None))
     found = run(linear, "J2", steps=3)
     assert "loss_plastic" not in found.history
+
+
+@pytest.mark.two_ranks
+@pytest.mark.parametrize("mortar", [False, True], ids=["nodes", "mortar"])
+def test_a_block_falls_on_ground_that_yields(comm: Any, mortar: bool) -> None:
+    """Two bodies of two materials with friction between them, and a side that lets waves out."""
+    lower = BlockMesh(lengths=(2.0, 1.0), divisions=(8, 4))
+    upper = BlockMesh(lengths=(0.5, 0.5), divisions=(3 if mortar else 2, 2))
+    mesh, tags = fem.build_mesh(
+        TwoBlocks(lower=lower, upper=upper, offset=(0.75, 0.0), gap=1e-3), comm
+    )
+    system = fem.assemble(
+        mesh,
+        [(tags["lower"], SOIL), (tags["upper"], vc.LinearElastic(2e9, 0.2, 2400.0))],
+        integration="bbar",
+        clamped=tags["lower_bottom"],
+        dashpots=[fem.Dashpots(tags["lower_left"]), fem.Dashpots(tags["lower_right"])],
+        initial_velocity=[(tags["upper"], (0.5, -3.0)), (tags["lower"], (0.0, 0.0))],
+    )
+    surface = fem.contact_pair(
+        system,
+        tags["upper_bottom"],
+        tags["lower_top"],
+        matching=fem.DualMortar() if mortar else None,
+    )
+    problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(0.4))
+    found = run(problem, "J2", steps=8 if comm.size > 1 else 25, dt=5e-4)
+    assert found.facts["worst_certificate"] <= 1e-9
+    assert found.facts["energy_defect"] <= 1e-9
+    if comm.rank == 0:
+        history = found.history
+        assert history["loss_plastic"][-1] > 0.05 * history["energy_kinetic"][0]
+        assert history["loss_damping"][-1] > 0.0
+
+
+@pytest.mark.serial
+def test_a_free_field_beside_yielding_ground_is_refused(comm: Any) -> None:
+    mesh, tags = fem.build_mesh(BlockMesh(lengths=(2.0, 1.0), divisions=(4, 2)), comm)
+    sides = soil.FreeField(tags["left"], base=vc.Ricker(1.0, 4.0))
+    with pytest.raises(InputError, match="a material that yields does not go with motions"):
+        fem.assemble(mesh, SOIL, integration="bbar", clamped=tags["bottom"], dashpots=sides)
+
+
+@pytest.mark.serial
+def test_a_state_without_its_stresses_is_refused(comm: Any) -> None:
+    """As one whose memory was lost, or one of another body."""
+    problem = throw(comm)
+    found = run(problem, "J2", steps=8)
+    lost = replace(found.state, memory={})
+    with pytest.raises(InputError, match="remembers no stress of the body"):
+        run(problem, "J2", steps=1, state=lost)
+    with pytest.raises(InputError, match="remembers other materials"):
+        run(throw(comm, "MohrCoulomb"), "J2", steps=1, state=found.state)
+
+
+@pytest.mark.serial
+def test_supports_of_a_body_that_yields_cannot_be_released(comm: Any) -> None:
+    problem = column(comm, SOIL)
+    state = vc.static_equilibrium(problem)
+    with pytest.raises(InputError, match="release: the body yields"):
+        fem.release(problem, state, column(comm, SOIL))
