@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vi_contact import soil
 from vi_contact.core.errors import InputError
 from vi_contact.laws import J2, DruckerPrager, Iwan, MohrCoulomb
 from vi_contact.laws.mandel import ROOT, find_principal, to_tensors, to_vectors
@@ -361,6 +362,18 @@ def test_strengths_that_are_none_are_refused(
 ) -> None:
     with pytest.raises(InputError, match=sentence):
         law(**SOIL, **values)
+
+
+def test_published_curves_are_tables() -> None:
+    """Those of Seed and Idriss are; Vucetic and Dobry's of sand falls at its end, and is told."""
+    curves = soil.SoilCurves.seed_idriss()
+    law = Iwan(**SOIL, curve=list(zip(curves.strain, curves.reduction, strict=True)))
+    assert len(law.elements[0]) > 5
+    curves = soil.SoilCurves.vucetic_dobry(0.0)
+    table = list(zip(curves.strain, curves.reduction, strict=True))
+    with pytest.raises(InputError, match="beyond gamma = 0.00316; leave out what is beyond"):
+        Iwan(**SOIL, curve=table)
+    assert Iwan(**SOIL, curve=table[:-1])
 
 
 def test_softening_is_refused() -> None:

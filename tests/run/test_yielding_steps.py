@@ -421,3 +421,25 @@ def test_supports_of_a_body_that_yields_cannot_be_released(comm: Any) -> None:
     state = vc.static_equilibrium(problem)
     with pytest.raises(InputError, match="release: the body yields"):
         fem.release(problem, state, column(comm, SOIL))
+
+
+@pytest.mark.serial
+def test_an_initial_displacement_has_yielded_already(comm: Any) -> None:
+    """A body that is let go from a stretch beyond yield: its first stress is on the surface, and
+    ledger counts from there."""
+    mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0, 1.0), divisions=(3, 3)), comm)
+    system = fem.assemble(
+        mesh,
+        STEEL,
+        integration="bbar",
+        clamped=tags["bottom"],
+        initial_displacement=lambda x: np.stack([0.0 * x[:, 0], 4e-3 * x[:, 1]], axis=1),
+    )
+    problem = vc.ContactProblem(system, empty_surface(system.space.comm, 2))
+    stepper = vc.Stepper(problem, solver=vc.Condensed())
+    first = stepper.attempt(1e-5).report.old
+    alpha = first.memory["material_0_alpha"]
+    assert alpha.min() > 1e-4
+    found = run(problem, "J2", steps=20, dt=1e-5, record=[vc.Energy()])
+    assert found.facts["energy_defect"] <= 1e-10
+    assert found.history["loss_plastic"][1] < 0.1 * found.history["energy_strain"][0]

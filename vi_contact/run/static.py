@@ -33,7 +33,7 @@ from ..solvers.automatic import Automatic
 from ..solvers.certified import TOLERANCE, CertifiedSolver
 from ..solvers.door import refuse_matrix, refuse_nan
 from ..solvers.nonlinear import NonlinearSolver
-from .materials import certify_material, remember_material, stand
+from .materials import certify_material, keep_material, remember_material, stand
 from .method import check_methods
 from .proximal import Proximal
 
@@ -229,7 +229,9 @@ class Equilibria:
             old: the state before.
             t: the time [s].
         """
-        system = self._problem.standing_at(old, "static_load").static_load
+        name = "static_load"
+        old = keep_material(self._problem.standing_at(old, name).static_load, old, old)
+        system = self._problem.standing_at(old, name).static_load
         stage = stand(system, self._pose_stage(old, t))
         if self.curved is None:
             self.curved = NonlinearSolver(
