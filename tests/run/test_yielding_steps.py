@@ -443,3 +443,62 @@ def test_an_initial_displacement_has_yielded_already(comm: Any) -> None:
     found = run(problem, "J2", steps=20, dt=1e-5, record=[vc.Energy()])
     assert found.facts["energy_defect"] <= 1e-10
     assert found.history["loss_plastic"][1] < 0.1 * found.history["energy_strain"][0]
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("law", ["J2", "MohrCoulomb"])
+def test_mirrored_throws_are_mirrored(comm: Any, law: str) -> None:
+    """A block thrown to the left moves as the mirror image of one thrown to the right."""
+    ends = []
+    for sign in (1.0, -1.0):
+        mesh, tags = fem.build_mesh(BlockMesh(lengths=(0.5, 1.0), divisions=(4, 8)), comm)
+        system = fem.assemble(
+            mesh, LAWS[law], integration="bbar", initial_velocity=(sign * 1.0, -4.0)
+        )
+        ground = vc.HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
+        surface = fem.contact_surface(system, tags["bottom"], obstacle=ground)
+        problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(0.3))
+        found = run(problem, law, steps=20)
+        space: Any = system.space
+        nodal = space.expand(problem.cartesian(found.state.u), 0.0) * np.array([sign, 1.0])
+        place = space.points[:, 0] if sign > 0.0 else 0.5 - space.points[:, 0]
+        ends.append(nodal[np.lexsort((np.round(place, 9), np.round(space.points[:, 1], 9)))])
+    assert np.abs(ends[0] - ends[1]).max() <= 1e-7 * np.abs(ends[0]).max()
+
+
+@pytest.mark.serial
+def test_units_of_force_do_not_matter(comm: Any) -> None:
+    """With all masses and stresses in thousands the motion is the same."""
+    ends = []
+    for unit in (1.0, 1e3):
+        law = MohrCoulomb(50e6 / unit, 0.3, 1900.0 / unit, 10e3 / unit, 30.0, 10.0)
+        mesh, tags = fem.build_mesh(BlockMesh(lengths=(0.5, 1.0), divisions=(4, 8)), comm)
+        system = fem.assemble(mesh, law, integration="bbar", initial_velocity=(1.0, -2.0))
+        ground = vc.HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
+        surface = fem.contact_surface(system, tags["bottom"], obstacle=ground)
+        problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(0.3))
+        ends.append(run(problem, "MohrCoulomb", steps=15).state.u)
+    assert np.abs(ends[0] - ends[1]).max() <= 1e-7 * np.abs(ends[0]).max()
+
+
+@pytest.mark.serial
+def test_hexahedra_and_tetrahedra_are_thrown(comm: Any) -> None:
+    """The same laws in space, with bbar and with degree 2."""
+    for simplices in (False, True):
+        mesh, tags = fem.build_mesh(
+            BlockMesh(lengths=(0.5, 0.5, 0.5), divisions=(2, 2, 2), simplices=simplices), comm
+        )
+        system = fem.assemble(
+            mesh,
+            SOIL,
+            degree=2 if simplices else 1,
+            integration="full" if simplices else "bbar",
+            initial_velocity=(0.5, 0.0, -3.0),
+        )
+        ground = vc.HalfSpace(point=(0.0, 0.0, 0.0), normal=(0.0, 0.0, 1.0))
+        surface = fem.contact_surface(system, tags["back"], obstacle=ground)
+        problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(0.3))
+        found = run(problem, "MohrCoulomb", steps=10, dt=1e-3)
+        assert found.facts["worst_certificate"] <= 1e-9
+        assert found.facts["energy_defect"] <= 1e-9
+        assert found.history["loss_plastic"][-1] > 0.05 * found.history["energy_kinetic"][0]
