@@ -410,3 +410,22 @@ def test_a_law_without_yielding_is_elastic() -> None:
     assert np.array_equal(state["sigma"], de @ law.stiffness(6)) and D is not None
     assert np.abs(law.elastic_strain(state["sigma"]) - de).max() <= 1e-15
     assert np.array_equal(law.dissipation(de, law.start(np.zeros((20, 6))), state), np.zeros(20))
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("Mohr-Coulomb", MohrCoulomb(1e8, 0.3, 2000.0, 1e4, 30.0, 0.0)),
+        ("cone", DruckerPrager(1e8, 0.3, 2000.0, 1e4, 30.0, 0.0)),
+        ("J2 with hardening", J2(200e9, 0.3, 7800.0, 250e6, isotropic=2.2e9, kinematic=5e9)),
+        ("J2 with hardening", J2(200e9, 0.3, 7800.0, 250e6, isotropic=2e9, kinematic=5.5e9)),
+    ],
+)
+def test_a_wrong_return_is_told(right: str, wrong: Any) -> None:
+    """Dropped dilatancy, and hardening times 1.1, by the residual of the law that was meant."""
+    law = LAWS[right]
+    worst = 0.0
+    for de, old, new, _ in walk(wrong, 6):
+        sizes = (float(np.abs(new["sigma"]).max()), strain_of(law))
+        worst = max(worst, float(law.residual(de, old, new, sizes).max()))
+    assert worst >= 1e-4

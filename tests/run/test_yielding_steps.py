@@ -17,7 +17,7 @@ from vi_contact.core.algebra import largest
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.internal import MATERIAL
 from vi_contact.core.surfaces import empty_surface
-from vi_contact.laws import ConsistentMass, Iwan, MohrCoulomb
+from vi_contact.laws import J2, ConsistentMass, Iwan, MohrCoulomb
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
 from vi_contact.schemes import SS22, Houbolt, MoreauJean
@@ -255,6 +255,20 @@ class Wrong(MohrCoulomb):
         return {**new, "sigma": factor * new["sigma"]}, D
 
 
+class Boasting(J2):
+    """A law that tells a tenth too much of what it dissipates."""
+
+    def dissipation(self, de: Any, old: Any, new: Any) -> Any:
+        return 1.1 * super().dissipation(de, old, new)
+
+
+class Forgetful(J2):
+    """A law that leaves out what a step of finite size has beyond W and D."""
+
+    def remainder(self, old: Any, new: Any) -> Any:
+        return np.zeros(len(new["sigma"]))
+
+
 def column(comm: Any, law: Any, *, weight: bool = True, n: int = 6) -> vc.ContactProblem:
     """Ground 1 m wide and 3 m high between smooth walls, under its own weight."""
     mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0, 3.0), divisions=(2, n)), comm)
@@ -274,6 +288,19 @@ def test_a_law_that_is_wrong_gets_no_certificate(comm: Any) -> None:
     wrong = Wrong(1e8, 0.2, 2000.0, 0.0, 30.0, 0.0)
     with pytest.raises(StepFailure, match="the law of a material is not satisfied"):
         vc.static_equilibrium(column(comm, wrong))
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("kind", [Boasting, Forgetful])
+def test_the_ledger_tells_wrong_terms(comm: Any, kind: Any) -> None:
+    """No term is what the others leave, so that a wrong one shows in the defect."""
+    wrong = kind(200e9, 0.3, 7800.0, 250e6, isotropic=2e9)
+    mesh, tags = fem.build_mesh(BlockMesh(lengths=(0.5, 1.0), divisions=(2, 4)), comm)
+    system = fem.assemble(mesh, wrong, integration="bbar", initial_velocity=(0.0, -20.0))
+    ground = vc.HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
+    surface = fem.contact_surface(system, tags["bottom"], obstacle=ground)
+    found = run(vc.ContactProblem(system, surface), "J2", steps=20)
+    assert found.facts["energy_defect"] > 1e-3
 
 
 @pytest.mark.parametrize(("nu", "ratio"), [(0.2, 1.0 / 3.0), (0.3, 0.3 / 0.7)])
