@@ -18,7 +18,7 @@ Numbers of a case, with its name before them:
   cases over the steps in which at least 10 % of the points yield, where there are any.
 - ``share_stress``, ``share_assembly``, ``share_factor``: of the processor time of the steps, what
   goes into stresses and strains, into matrices of tangents, and into preparing linear steps.
-- ``bytes_per_point``: of a point of integration, with B, its state and weights.
+- ``bytes_per_point``: of a point of integration, with B, its state, and the pattern of tangents.
 - ``certificate``: the worst one, the law of the material in it.
 - ``energy_defect``: what the ledger leaves, over the largest energy.
 - ``yielding_points``: the mean share of points that yield in a step.

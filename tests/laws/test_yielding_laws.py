@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vi_contact import soil
 from vi_contact.core.errors import InputError
 from vi_contact.laws import J2, DruckerPrager, Iwan, MohrCoulomb
 from vi_contact.laws.mandel import ROOT, find_principal, to_tensors, to_vectors
@@ -363,6 +364,18 @@ def test_strengths_that_are_none_are_refused(
         law(**SOIL, **values)
 
 
+def test_published_curves_are_tables() -> None:
+    """Those of Seed and Idriss are; Vucetic and Dobry's of sand falls at its end, and is told."""
+    curves = soil.SoilCurves.seed_idriss()
+    law = Iwan(**SOIL, curve=list(zip(curves.strain, curves.reduction, strict=True)))
+    assert len(law.elements[0]) > 5
+    curves = soil.SoilCurves.vucetic_dobry(0.0)
+    table = list(zip(curves.strain, curves.reduction, strict=True))
+    with pytest.raises(InputError, match="beyond gamma = 0.00316; leave out what is beyond"):
+        Iwan(**SOIL, curve=table)
+    assert Iwan(**SOIL, curve=table[:-1])
+
+
 def test_softening_is_refused() -> None:
     for name in ("isotropic", "kinematic"):
         with pytest.raises(InputError, match="depend on the mesh"):
@@ -397,3 +410,22 @@ def test_a_law_without_yielding_is_elastic() -> None:
     assert np.array_equal(state["sigma"], de @ law.stiffness(6)) and D is not None
     assert np.abs(law.elastic_strain(state["sigma"]) - de).max() <= 1e-15
     assert np.array_equal(law.dissipation(de, law.start(np.zeros((20, 6))), state), np.zeros(20))
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("Mohr-Coulomb", MohrCoulomb(1e8, 0.3, 2000.0, 1e4, 30.0, 0.0)),
+        ("cone", DruckerPrager(1e8, 0.3, 2000.0, 1e4, 30.0, 0.0)),
+        ("J2 with hardening", J2(200e9, 0.3, 7800.0, 250e6, isotropic=2.2e9, kinematic=5e9)),
+        ("J2 with hardening", J2(200e9, 0.3, 7800.0, 250e6, isotropic=2e9, kinematic=5.5e9)),
+    ],
+)
+def test_a_wrong_return_is_told(right: str, wrong: Any) -> None:
+    """Dropped dilatancy, and hardening times 1.1, by the residual of the law that was meant."""
+    law = LAWS[right]
+    worst = 0.0
+    for de, old, new, _ in walk(wrong, 6):
+        sizes = (float(np.abs(new["sigma"]).max()), strain_of(law))
+        worst = max(worst, float(law.residual(de, old, new, sizes).max()))
+    assert worst >= 1e-4

@@ -12,13 +12,14 @@ import pytest
 from yielding_cases import LAWS, SOIL, STEEL, step_of, throw
 
 import vi_contact as vc
-from vi_contact import fem
+from vi_contact import fem, soil
 from vi_contact.core.algebra import largest
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.internal import MATERIAL
 from vi_contact.core.surfaces import empty_surface
-from vi_contact.laws import ConsistentMass, Iwan, MohrCoulomb
+from vi_contact.laws import J2, ConsistentMass, Iwan, MohrCoulomb
 from vi_contact.meshes.block import BlockMesh
+from vi_contact.meshes.two_blocks import TwoBlocks
 from vi_contact.schemes import SS22, Houbolt, MoreauJean
 from vi_contact.solvers import Iterative, Volume
 
@@ -254,6 +255,20 @@ class Wrong(MohrCoulomb):
         return {**new, "sigma": factor * new["sigma"]}, D
 
 
+class Boasting(J2):
+    """A law that tells a tenth too much of what it dissipates."""
+
+    def dissipation(self, de: Any, old: Any, new: Any) -> Any:
+        return 1.1 * super().dissipation(de, old, new)
+
+
+class Forgetful(J2):
+    """A law that leaves out what a step of finite size has beyond W and D."""
+
+    def remainder(self, old: Any, new: Any) -> Any:
+        return np.zeros(len(new["sigma"]))
+
+
 def column(comm: Any, law: Any, *, weight: bool = True, n: int = 6) -> vc.ContactProblem:
     """Ground 1 m wide and 3 m high between smooth walls, under its own weight."""
     mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0, 3.0), divisions=(2, n)), comm)
@@ -273,6 +288,19 @@ def test_a_law_that_is_wrong_gets_no_certificate(comm: Any) -> None:
     wrong = Wrong(1e8, 0.2, 2000.0, 0.0, 30.0, 0.0)
     with pytest.raises(StepFailure, match="the law of a material is not satisfied"):
         vc.static_equilibrium(column(comm, wrong))
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("kind", [Boasting, Forgetful])
+def test_the_ledger_tells_wrong_terms(comm: Any, kind: Any) -> None:
+    """No term is what the others leave, so that a wrong one shows in the defect."""
+    wrong = kind(200e9, 0.3, 7800.0, 250e6, isotropic=2e9)
+    mesh, tags = fem.build_mesh(BlockMesh(lengths=(0.5, 1.0), divisions=(2, 4)), comm)
+    system = fem.assemble(mesh, wrong, integration="bbar", initial_velocity=(0.0, -20.0))
+    ground = vc.HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
+    surface = fem.contact_surface(system, tags["bottom"], obstacle=ground)
+    found = run(vc.ContactProblem(system, surface), "J2", steps=20)
+    assert found.facts["energy_defect"] > 1e-3
 
 
 @pytest.mark.parametrize(("nu", "ratio"), [(0.2, 1.0 / 3.0), (0.3, 0.3 / 0.7)])
@@ -359,3 +387,145 @@ def test_histories_of_linear_bodies_have_no_plastic_loss(comm: Any) -> None:
     linear = replace(problem, system=problem.system.changed(internal=None))
     found = run(linear, "J2", steps=3)
     assert "loss_plastic" not in found.history
+
+
+@pytest.mark.two_ranks
+@pytest.mark.parametrize("mortar", [False, True], ids=["nodes", "mortar"])
+def test_a_block_falls_on_ground_that_yields(comm: Any, mortar: bool) -> None:
+    """Two bodies of two materials with friction between them, and a side that lets waves out."""
+    lower = BlockMesh(lengths=(2.0, 1.0), divisions=(8, 4))
+    upper = BlockMesh(lengths=(0.5, 0.5), divisions=(3 if mortar else 2, 2))
+    mesh, tags = fem.build_mesh(
+        TwoBlocks(lower=lower, upper=upper, offset=(0.75, 0.0), gap=1e-3), comm
+    )
+    system = fem.assemble(
+        mesh,
+        [(tags["lower"], SOIL), (tags["upper"], vc.LinearElastic(2e9, 0.2, 2400.0))],
+        integration="bbar",
+        clamped=tags["lower_bottom"],
+        dashpots=[fem.Dashpots(tags["lower_left"]), fem.Dashpots(tags["lower_right"])],
+        initial_velocity=[(tags["upper"], (0.5, -3.0)), (tags["lower"], (0.0, 0.0))],
+    )
+    surface = fem.contact_pair(
+        system,
+        tags["upper_bottom"],
+        tags["lower_top"],
+        matching=fem.DualMortar() if mortar else None,
+    )
+    problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(0.4))
+    found = run(problem, "J2", steps=8 if comm.size > 1 else 25, dt=5e-4)
+    assert found.facts["worst_certificate"] <= 1e-9
+    assert found.facts["energy_defect"] <= 1e-9
+    if comm.rank == 0:
+        history = found.history
+        assert history["loss_plastic"][-1] > 0.05 * history["energy_kinetic"][0]
+        assert history["loss_damping"][-1] > 0.0
+
+
+@pytest.mark.serial
+def test_a_free_field_beside_yielding_ground_is_refused(comm: Any) -> None:
+    mesh, tags = fem.build_mesh(BlockMesh(lengths=(2.0, 1.0), divisions=(4, 2)), comm)
+    sides = soil.FreeField(tags["left"], base=vc.Ricker(1.0, 4.0))
+    with pytest.raises(InputError, match="a material that yields does not go with motions"):
+        fem.assemble(mesh, SOIL, integration="bbar", clamped=tags["bottom"], dashpots=sides)
+
+
+@pytest.mark.serial
+def test_a_state_without_its_stresses_is_refused(comm: Any) -> None:
+    """As one whose memory was lost, or one of another body."""
+    problem = throw(comm)
+    found = run(problem, "J2", steps=8)
+    lost = replace(found.state, memory={})
+    with pytest.raises(InputError, match="remembers no stress of the body"):
+        run(problem, "J2", steps=1, state=lost)
+    with pytest.raises(InputError, match="remembers other materials"):
+        run(throw(comm, "MohrCoulomb"), "J2", steps=1, state=found.state)
+
+
+@pytest.mark.serial
+def test_supports_of_a_body_that_yields_cannot_be_released(comm: Any) -> None:
+    problem = column(comm, SOIL)
+    state = vc.static_equilibrium(problem)
+    with pytest.raises(InputError, match="release: the body yields"):
+        fem.release(problem, state, column(comm, SOIL))
+
+
+@pytest.mark.serial
+def test_an_initial_displacement_has_yielded_already(comm: Any) -> None:
+    """A body that is let go from a stretch beyond yield: its first stress is on the surface, and
+    ledger counts from there."""
+    mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0, 1.0), divisions=(3, 3)), comm)
+    system = fem.assemble(
+        mesh,
+        STEEL,
+        integration="bbar",
+        clamped=tags["bottom"],
+        initial_displacement=lambda x: np.stack([0.0 * x[:, 0], 4e-3 * x[:, 1]], axis=1),
+    )
+    problem = vc.ContactProblem(system, empty_surface(system.space.comm, 2))
+    stepper = vc.Stepper(problem, solver=vc.Condensed())
+    first = stepper.attempt(1e-5).report.old
+    alpha = first.memory["material_0_alpha"]
+    assert alpha.min() > 1e-4
+    found = run(problem, "J2", steps=20, dt=1e-5, record=[vc.Energy()])
+    assert found.facts["energy_defect"] <= 1e-10
+    assert found.history["loss_plastic"][1] < 0.1 * found.history["energy_strain"][0]
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("law", ["J2", "MohrCoulomb"])
+def test_mirrored_throws_are_mirrored(comm: Any, law: str) -> None:
+    """A block thrown to the left moves as the mirror image of one thrown to the right."""
+    ends = []
+    for sign in (1.0, -1.0):
+        mesh, tags = fem.build_mesh(BlockMesh(lengths=(0.5, 1.0), divisions=(4, 8)), comm)
+        system = fem.assemble(
+            mesh, LAWS[law], integration="bbar", initial_velocity=(sign * 1.0, -4.0)
+        )
+        ground = vc.HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
+        surface = fem.contact_surface(system, tags["bottom"], obstacle=ground)
+        problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(0.3))
+        found = run(problem, law, steps=20)
+        space: Any = system.space
+        nodal = space.expand(problem.cartesian(found.state.u), 0.0) * np.array([sign, 1.0])
+        place = space.points[:, 0] if sign > 0.0 else 0.5 - space.points[:, 0]
+        ends.append(nodal[np.lexsort((np.round(place, 9), np.round(space.points[:, 1], 9)))])
+    assert np.abs(ends[0] - ends[1]).max() <= 1e-7 * np.abs(ends[0]).max()
+
+
+@pytest.mark.serial
+def test_units_of_force_do_not_matter(comm: Any) -> None:
+    """With all masses and stresses in thousands the motion is the same."""
+    ends = []
+    for unit in (1.0, 1e3):
+        law = MohrCoulomb(50e6 / unit, 0.3, 1900.0 / unit, 10e3 / unit, 30.0, 10.0)
+        mesh, tags = fem.build_mesh(BlockMesh(lengths=(0.5, 1.0), divisions=(4, 8)), comm)
+        system = fem.assemble(mesh, law, integration="bbar", initial_velocity=(1.0, -2.0))
+        ground = vc.HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
+        surface = fem.contact_surface(system, tags["bottom"], obstacle=ground)
+        problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(0.3))
+        ends.append(run(problem, "MohrCoulomb", steps=15).state.u)
+    assert np.abs(ends[0] - ends[1]).max() <= 1e-7 * np.abs(ends[0]).max()
+
+
+@pytest.mark.serial
+def test_hexahedra_and_tetrahedra_are_thrown(comm: Any) -> None:
+    """The same laws in space, with bbar and with degree 2."""
+    for simplices in (False, True):
+        mesh, tags = fem.build_mesh(
+            BlockMesh(lengths=(0.5, 0.5, 0.5), divisions=(2, 2, 2), simplices=simplices), comm
+        )
+        system = fem.assemble(
+            mesh,
+            SOIL,
+            degree=2 if simplices else 1,
+            integration="full" if simplices else "bbar",
+            initial_velocity=(0.5, 0.0, -3.0),
+        )
+        ground = vc.HalfSpace(point=(0.0, 0.0, 0.0), normal=(0.0, 0.0, 1.0))
+        surface = fem.contact_surface(system, tags["back"], obstacle=ground)
+        problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(0.3))
+        found = run(problem, "MohrCoulomb", steps=10, dt=1e-3)
+        assert found.facts["worst_certificate"] <= 1e-9
+        assert found.facts["energy_defect"] <= 1e-9
+        assert found.history["loss_plastic"][-1] > 0.05 * found.history["energy_kinetic"][0]

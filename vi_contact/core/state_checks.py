@@ -8,6 +8,7 @@ import numpy as np
 from .algebra import max_abs
 from .checks import instance, number, quote, refuse, whole
 from .errors import InputError
+from .internal import remembers, select_memory
 from .obstacles import PRESS_FIT
 from .problem import ContactProblem
 from .step import State
@@ -49,8 +50,9 @@ def check_sizes(owner: str, problem: ContactProblem, state: Any) -> None:
 def _find_defects_of_state(problem: ContactProblem, state: State) -> Iterator[str]:
     """Yield a sentence for each wrong array of a state on this rank.
 
-    Its memory is not looked at: that is for its scheme.
+    Its memory is not looked at, which is for its scheme, but for what materials remember.
     """
+    yield from _find_defects_of_material(problem, state)
     n = problem.system.rows
     m = problem.surface.count
     d = problem.system.influence.shape[1]
@@ -75,6 +77,21 @@ def _find_defects_of_state(problem: ContactProblem, state: State) -> Iterator[st
         if value.dtype.kind not in kinds or not np.all(np.isfinite(value)):
             wanted = "True or False" if name == "active" else "finite real numbers"
             yield f"{name} of the state is {quote(value)}: give {wanted}"
+
+
+def _find_defects_of_material(problem: ContactProblem, state: State) -> Iterator[str]:
+    """Yield a sentence where materials that remember cannot go on from a state on this rank."""
+    internal: Any = problem.system.internal
+    if not remembers(internal):
+        return
+    memory = select_memory(state.memory)
+    if memory and not internal.fits(memory):
+        yield "the state remembers other materials or another mesh: give a state of this problem"
+    elif not memory and np.any(state.u):
+        yield (
+            "the state is deformed and remembers no stress of the body, which yields: give the "
+            "state that a static stage or a run of this problem has returned"
+        )
 
 
 def initial_state(problem: ContactProblem, t: float = 0.0) -> State:

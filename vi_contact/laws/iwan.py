@@ -65,7 +65,8 @@ class Iwan(YieldingMaterial):
             at = 0.0 if rising[0] == 0 else gamma[rising[0] - 1]
             raise InputError(
                 f"Iwan: the stress G gamma of curve bends upwards, or falls, beyond gamma = "
-                f"{at:g}; give a table whose shear stress rises ever more slowly"
+                f"{at:g}; leave out what is beyond, or give a table whose stress rises ever more "
+                "slowly"
             )
 
     def _find_slopes(self) -> Array:

@@ -9,22 +9,25 @@ from typing import Any
 from ..core.certificate import Certificate
 from ..core.errors import StepFailure
 from ..core.internal import remembers, select_memory
-from ..core.problem import ContactProblem
 from ..core.step import State
 from ..core.system import SemiDiscreteSystem
 
 
-def keep_material(problem: ContactProblem, old: State, new: State) -> State:
+def keep_material(system: SemiDiscreteSystem, old: State, new: State) -> State:
     """Return a state with what materials remember in another one: schemes make memory anew.
 
+    A first state remembers nothing: its displacement was reached from none. Collective.
+
     Args:
-        problem: whose state it is.
+        system: the equations, whose materials stand at ``old``.
         old: that remembers.
         new: at the same place.
     """
-    if not remembers(problem.system.internal):
+    internal: Any = system.internal
+    if not remembers(internal):
         return new
-    return replace(new, memory={**new.memory, **select_memory(old.memory)})
+    known = select_memory(old.memory) or internal.remember(old.u)
+    return replace(new, memory={**new.memory, **known})
 
 
 def remember_material(system: SemiDiscreteSystem, state: State) -> State:

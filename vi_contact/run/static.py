@@ -36,7 +36,7 @@ from ..solvers.door import refuse_matrix, refuse_nan
 from ..solvers.joints import JointSolver
 from ..solvers.nonlinear import NonlinearSolver
 from . import joint_steps
-from .materials import certify_material, remember_material
+from .materials import certify_material, keep_material, remember_material
 from .method import check_methods
 from .proximal import Proximal
 
@@ -233,7 +233,9 @@ class Equilibria:
             t: the time [s].
         """
         problem = self._problem
-        system = problem.standing_at(old, "static_load").static_load
+        name = "static_load"
+        old = keep_material(problem.standing_at(old, name).static_load, old, old)
+        system = problem.standing_at(old, name).static_load
         stage = self._pose_stage(old, t)
         step = pose(problem, stage, self._K, system)
         certified = self.solver.solve(step)

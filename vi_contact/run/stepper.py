@@ -184,7 +184,7 @@ class Stepper:
         with together(method.problem.surface.comm):  # it may ask for loads, which are the user's
             problem = method.problem.standing_at(self.state)
             state = method.scheme.start(problem, self.state, dt)
-        return keep_material(problem, self.state, state)
+        return keep_material(problem.equations, self.state, state)
 
     def _attempt(self, dt: float) -> Report:
         """Return a step of dt [s].

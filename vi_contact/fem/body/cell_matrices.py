@@ -43,6 +43,11 @@ class CellMatrices:
         self._ends = np.concatenate([[0], np.cumsum(counts)]).astype(kind)
         self._pattern: Any = None
 
+    @property
+    def bytes(self) -> int:
+        """Return the bytes of the pattern on this rank."""
+        return self._place.nbytes + self._columns.nbytes + self._named.nbytes + self._ends.nbytes
+
     def add_up(self, matrices: Array) -> Any:
         """Return the PETSc matrix of the sum of matrices (cells, k, k). Collective."""
         values = np.bincount(self._place, matrices.ravel(), self._count + 1)[: self._count]

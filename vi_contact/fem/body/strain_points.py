@@ -85,8 +85,9 @@ class StrainPoints:
 
     @property
     def bytes(self) -> int:
-        """Return the bytes of B, its weights and numbers on this rank."""
-        return self._B.nbytes + self.weights.nbytes + self._dofs.nbytes + self.places.nbytes
+        """Return the bytes of B, its weights and numbers, and of the pattern of tangents."""
+        own = self._B.nbytes + self.weights.nbytes + self._dofs.nbytes + self.places.nbytes
+        return own if self._free is None else own + self._free.bytes
 
     def strain(self, u: Array) -> Array:
         """Return eps (points, n) of free unknowns (n,) [m]. Collective."""
