@@ -591,3 +591,52 @@ def test_conditions_as_traces_are_the_same_conditions(scheme):
         functions = [fem.as_function(problem, run[-1].new, name).x.array for problem, run in runs]
         scale = max(np.abs(functions[0]).max(), 1e-9 * np.abs(u).max())
         assert np.abs(functions[0] - functions[1]).max() < 1e-7 * scale
+
+
+@pytest.mark.serial
+def test_a_restart_goes_on_bit_for_bit():
+    """A wall of rings that is stopped after six steps goes on as if it had not been."""
+    _, problem = bond(push=(3e5, -1e6))
+    straight = [state for state, _ in vc.march(problem, dt=5e-4, steps=12)]
+    *_, half = [state for state, _ in vc.march(problem, dt=5e-4, steps=6)]
+    *_, end = [state for state, _ in vc.march(problem, dt=5e-4, steps=6, state=half)]
+    for name in ("u", "v", "r_n", "r_t"):
+        assert np.array_equal(getattr(end, name), getattr(straight[-1], name))
+
+
+@pytest.mark.serial
+def test_scaled_units_scale_the_forces():
+    """Lengths in millimetres and forces in kilonewtons: the same wall, to rounding."""
+    found = []
+    for length, stress in ((1.0, 1.0), (1e3, 1e-9)):
+        blocks = {
+            "up": ((2.0, 0.5), (8, 2), (0.0, 1.0)),
+            "a": ((1.0, 1.0), (4, 4), (0.0, 0.0)),
+            "b": ((1.0, 1.0), (4, 4), (1.0, 0.0)),
+        }
+        meshes = {
+            name: BlockMesh(
+                lengths=tuple(length * x for x in lengths),
+                divisions=cells,
+                corner=tuple(length * x for x in corner),
+            )
+            for name, (lengths, cells, corner) in blocks.items()
+        }
+        mesh, tags = fem.build_mesh(Blocks(meshes), COMM)
+        stones = {
+            name: vc.LinearElastic(E=E * stress, nu=0.2, rho=1.0)
+            for name, E in (("up", 1e9), ("a", 1e9), ("b", 2e9))
+        }
+        system = fem.assemble(
+            mesh,
+            [(tags[name], stone) for name, stone in stones.items()],
+            clamped=[tags["a_bottom"], tags["b_bottom"]],
+            loads=fem.Traction(tags["up_top"], (1e5 * stress, -1e6 * stress)),
+        )
+        bed = fem.contact_pair(system, tags["up_bottom"], several(mesh, tags, "a_top", "b_top"))
+        head = fem.contact_pair(system, tags["a_right"], tags["b_left"])
+        surface = fem.joined_surfaces(bed, head)
+        problem = ContactProblem(system, surface, friction=vc.Coulomb(0.5))
+        state = vc.static_equilibrium(problem)
+        found.append(np.column_stack([state.r_n, state.r_t]) / (stress * length))
+    assert np.abs(found[0] - found[1]).max() < 1e-7 * found[0].max()
