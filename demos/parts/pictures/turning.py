@@ -42,9 +42,7 @@ def plot_fall(folder: Path, history: History, tilt: Array, rigid: Any, path: Pat
         _, u, _ = frames.at(float(frames.t[row]))
         points = frames.points + u
         shade = f"{0.9 - 0.4 * angle / wanted[-1]:.3f}"
-        add_polygons(
-            places, points[frames.cells], facecolor=shade, edgecolor="0.2", linewidth=0.4
-        )
+        add_polygons(places, points[frames.cells], facecolor=shade, edgecolor="0.2", linewidth=0.4)
         low = np.minimum(low, points.min(axis=0))
         high = np.maximum(high, points.max(axis=0))
     places.axhline(0.0, color="tab:brown", lw=1.5)
