@@ -27,6 +27,7 @@ import vi_contact as vc
 from demos.parts.pictures.turning import plot_fall
 from demos.parts.problems.turning import GRAVITY, RigidBlock, find_tilts, shake_column
 from vi_contact import fem
+from vi_contact.laws import ImpulseUpdate
 from vi_contact.practice.cli import status_of
 
 # Parameters
@@ -51,7 +52,7 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
         material=STONE,
         divisions=(2, 8) if quick else (4, 16),
         friction=vc.Coulomb(0.7),
-        impact=vc.Inelastic(vc.laws.ImpulseUpdate()),
+        impact=vc.Inelastic(ImpulseUpdate()),
     )
     solution = vc.simulate(
         problem,

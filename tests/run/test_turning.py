@@ -203,10 +203,8 @@ def test_steps_are_halved_where_a_corner_lands(comm: Any) -> None:
     lost = []
     for plan in (0.02, vc.HalvedAtImpact(0.02, halvings=4)):
         problem = turning.rock_block(comm, RigidBlock(0.5, 1.0), 0.2, divisions=(2, 4))
-        first = None
-        for _, report in vc.march(problem, dt=plan, t_end=0.34):
-            first = turning.find_energy(problem, report.old) if first is None else first
-        lost.append(first - turning.find_energy(problem, report.new))
+        (_, first), *_, (state, _) = vc.march(problem, dt=plan, t_end=0.34)
+        lost.append(turning.find_energy(problem, first.old) - turning.find_energy(problem, state))
     assert 0.0 < lost[1] < 0.5 * lost[0]
 
 
@@ -219,7 +217,7 @@ def test_a_block_is_thrown_into_a_corner(comm: Any) -> None:
     system = fem.assemble(
         mesh,
         SOFT,
-        initial_velocity=lambda x: np.array([-4.0, -2.0]) + 5.0 * x[:, ::-1] * [-1.0, 1.0],
+        initial_velocity=lambda x: np.array([-3.0, -4.0]) + 2.0 * x[:, ::-1] * [-1.0, 1.0],
     )
     wall = vc.HalfSpace((0.0, 0.0), (1.0, 0.0))
     surfaces = [fem.contact_surface(system, obstacle=plane) for plane in (FLOOR, wall)]
@@ -231,10 +229,10 @@ def test_a_block_is_thrown_into_a_corner(comm: Any) -> None:
         if before is None:
             before = turning.find_energy(problem, report.old)
             momenta = turning.find_momenta(problem, report.old)
-        r = problem.surface.everywhere(state.r_n)
-        sides = [r[len(r) // 2 :].sum(), r[: len(r) // 2].sum()]
-        impulse += 2e-3 * np.array(sides)
-        touched += np.array(sides) > 0.0
+        # obstacles press against the directions of the conditions
+        sides = -problem.surface.comm.sum(state.r_n @ problem.surface.normals)
+        impulse += 2e-3 * sides
+        touched += sides > 0.0
         after = turning.find_energy(problem, state)
         assert after <= before * (1.0 + 1e-10)
     assert np.all(touched > 0)

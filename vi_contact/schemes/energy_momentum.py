@@ -25,7 +25,6 @@ from ..core.internal import turns
 from ..core.problem import ContactProblem
 from ..core.stage import Affine, Answer, Stage
 from ..core.step import State
-from ..laws.mass import ConsistentMass
 from .base import SingleStep, end_state, position_stage
 
 
@@ -40,13 +39,7 @@ class EnergyMomentum(SingleStep):
     for_turning: ClassVar[bool] = True
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for a mass or an internal force that does not turn with the body."""
-        if not isinstance(problem.mass, ConsistentMass):
-            raise InputError(
-                f"EnergyMomentum() does not go with mass={problem.mass}, whose inertia against "
-                "spin changes as the body turns (of a block of 4 x 8 cells by 3.6 % at 90 degrees)"
-                ": give the problem mass=ConsistentMass(), or leave mass= out"
-            )
+        """Raise InputError for massless unknowns, and an internal force of one end alone."""
         super().check(problem)
         internal = problem.equations.internal
         if internal is not None and not turns(internal):
