@@ -269,3 +269,49 @@ def test_mortar_and_node_to_node_rupture_alike(comm: Any) -> None:
             stepper.accept(trial)
         slips.append(stepper.state.memory["joint_way"].max())
     assert slips[1] == pytest.approx(slips[0], rel=1e-9)
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("creep", [1e-6, 1e-12])
+def test_rate_and_state_on_a_fault(comm: Any, creep: float) -> None:
+    """A fault that creeps, or hardly moves, is pushed harder in its middle: all points are solved
+    together in two passes, also where slips are as small as rounding; friction is what the law
+    says at the rates."""
+    law = laws.RateAndState(
+        a=0.012,
+        b=lambda x: np.where(np.abs(x[:, 0] - HALF) < 10e3, 0.016, 0.008),
+        mu0=0.6,
+        V0=1e-6,
+        dc=0.02,
+        theta=0.02 / creep,
+        speed=creep,
+        prestress=laws.Prestress(
+            normal=SIGMA,
+            shear=lambda x: 75e6 + 6e6 * np.exp(-(((x[:, 0] - HALF) / 1500.0) ** 2)),
+        ),
+    )
+    problem = replace(fault(comm, 1000.0), joint=law)
+    stepper = vc.Stepper(problem, scheme=MIDPOINT, solver=vc.Condensed())
+    recorders = [vc.Energy(), vc.JointEnergy()]
+    row: dict[str, float] = {}
+    for recorder in recorders:
+        row |= recorder.start(stepper.method.problem, stepper.state)
+    for _ in range(40):
+        before = stepper.state
+        trial = stepper.attempt(0.02)
+        state = stepper.accept(trial)
+        assert trial.report.certificate.worst < 1e-9
+        for recorder in recorders:
+            row |= recorder.row(trial.report)
+    assert np.mean(stepper.joints[0.02].passes) < 3.0
+    surface = problem.surface
+    committed = {name: before.memory[f"joint_{name}"] for name in ("theta", "speed")}
+    speed = state.memory["joint_speed"]
+    mu, _ = problem.joint.at_speed(committed, speed, 0.02)
+    assert np.allclose(np.abs(state.r_t[:, 0]), mu * state.r_n, rtol=1e-9)
+    slip = np.abs(surface.tangential_values(state.u - before.u)[:, 0])
+    # The prestress alone would move a point by 6 mm in a step, whose rounding the slip has.
+    assert np.allclose(slip, 0.02 * speed, rtol=1e-6, atol=1e-14)
+    both = row["loss_contact"] + row["loss_friction"]
+    parts = row["loss_rubbing"] + row["loss_closing"] - row["work_prestress"]
+    assert parts == pytest.approx(both, abs=1e-8 * row["loss_rubbing"])

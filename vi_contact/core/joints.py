@@ -38,6 +38,9 @@ MEMORY = "joint_"  # how names of committed arrays begin in the memory of a stat
 RAISED = "raised"  # the frame's own committed array: the dilation of the step before
 TINY = 1e-10  # of the largest force of a step: below it no strength is judged
 ROUNDING = 1e-5  # of the displacements of a step: a slip that is judged is no smaller
+# Of what the largest load moves by itself: forces are certified relative to it, so a slip is known
+# to the tolerance times that; it is judged a hundred times sharper.
+OF_LOAD = 1e-2
 
 
 @dataclass(frozen=True)
@@ -325,15 +328,18 @@ def measure_lag(step: StepProblem, result: StepResult) -> float:
     friction = np.abs(there.mu - used.mu) * r_n
 
     # A law that is solved for the rate is so steep at rest that round-off of a slip is seen in mu.
-    # There the slip itself is judged, in the size of the slips of the step, and mu at its rate.
+    # There the slip itself is judged, in the size of the slips of the step or of what rounding
+    # leaves of its displacements, and mu at its rate.
     if joint.speed is not None:
         at_rate = np.abs(joint.law.at_speed(joint.committed, joint.speed, joint.dt)[0] - used.mu)
         way = np.linalg.norm(s1 - joint.s0, axis=1)
         missing = np.abs(way - joint.speed * joint.dt)
-        length = max(max_abs(result.x), max_abs(step.start))
+        of_load = max_abs(step.b) / step.A.largest  # what the loads move by themselves [m]
+        length = ROUNDING * max(max_abs(result.x), max_abs(step.start))
+        length = max(length, OF_LOAD * of_load)
         way_most, length = step.surface.comm.max(np.array([max_abs(way), length]))
         largest_force = step.surface.comm.max(np.array([max_abs(used.mu * r_n)]))[0]
-        of_slip = largest_force * missing / (max(way_most, ROUNDING * length) or 1.0)
+        of_slip = largest_force * missing / (max(way_most, length) or 1.0)
         friction = np.maximum(np.minimum(friction, of_slip), at_rate * r_n)
 
     force = max_abs(step.b) / step.scale

@@ -46,7 +46,7 @@ class Joint(OfPoints):
         mu: coefficient of friction.
         cohesion: c [Pa]; at least mu times the tension.
         tension: tensile strength f_t [Pa].
-        energy: G_f [J/m²]; give it or the opening.
+        energy: G_f [N/m], joules a square metre; give it or the opening.
         opening: dc [m], at which nothing is left; of a joint without tension, the slip.
         softening: "linear", "brittle" or "constant".
         dilatancy: tan(psi), by how much slip lifts the joint.
@@ -59,7 +59,7 @@ class Joint(OfPoints):
     mu: Annotated[NotNegativeByPoint, RATIO, "the friction coefficient mu"] = 0.0
     cohesion: Annotated[NotNegativeByPoint, Unit("Pa"), "the cohesion"] = 0.0
     tension: Annotated[NotNegativeByPoint, Unit("Pa"), "the tension"] = 0.0
-    energy: Annotated[PositiveByPoint | None, Unit("J/m²"), "the fracture energy"] = None
+    energy: Annotated[PositiveByPoint | None, Unit("N/m"), "the fracture energy"] = None
     opening: Annotated[PositiveByPoint | None, Unit("m"), "the opening"] = None
     softening: Literal["linear", "brittle", "constant"] = "linear"
     dilatancy: Annotated[NotNegativeByPoint, RATIO, "the dilatancy tan(psi)"] = 0.0

@@ -83,7 +83,7 @@ def list_steps(model: Model, pen: Pen) -> Iterator[Row]:
         yield say(name, ", then ".join(kinds), remark)
     joint = model.get("joint") or {}
     if joint:
-        yield say("joint", str(joint["law"]).partition("(")[0], _shorten_numbers(joint["law"]))
+        yield say("joint", str(joint["law"]).partition("(")[0])
         if joint["lambda"] is not None:
             remark = "below 1 every step has one answer; above, a joint may snap back inside it"
             yield say("joint: lambda of a step", write_number(joint["lambda"]), remark)
