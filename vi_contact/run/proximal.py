@@ -201,7 +201,7 @@ class Proximal:
             if result.iterations > INNER:
                 raise StepFailure(f"{result.method} took more than {INNER} iterations")
             if not progress.is_certified:
-                self._refuse_flight(new)
+                self._refuse_flight(new, result.x)
 
             # Settled reactions need a share of themselves to change; a larger one when the last did
             # not help.
@@ -272,10 +272,16 @@ class Proximal:
         size = largest(self.step.surface.comm, max_abs(motion.d))
         return np.asarray((motion.closing > STOPPED * size) & np.isfinite(self.step.bound))
 
-    def _refuse_flight(self, motion: _Motion) -> None:
+    def _refuse_flight(self, motion: _Motion, u: Array) -> None:
         """Raise InputError for a rigid motion without end that loads drive. Collective.
 
-        It bends nothing, dᵀKd = 0, the loads work on it, f·d > 0, and no contact stops it.
+        It bends nothing, dᵀKd = 0, the loads work on it, f·d > 0, and no contact stops it. Where
+        there is an equilibrium u*, f·d is at most u*ᵀK d for such a motion, so that a work below
+        √(uᵀKu dᵀKd) tells nothing: soft motions of many bodies bend them a little.
+
+        Args:
+            motion: the step.
+            u: where it has led (n,) [m].
         """
         system = self._system
         energy = motion.pace**2
@@ -284,6 +290,8 @@ class Proximal:
         stopped = self.step.surface.some(self._find_closing(motion))
         # It does not move, it deforms the body, no load drives it, or a contact stops it.
         if energy == 0.0 or bending > RIGID * energy or work < DRIVEN * energy or stopped:
+            return
+        if work**2 < 2.0 * system.strain_energy(u) * bending:
             return
         way = self._describe_way(motion.d)
         raise InputError(
