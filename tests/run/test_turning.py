@@ -255,3 +255,24 @@ def test_schemes_that_blow_up_are_refused() -> None:
     other = vc.ContactProblem(plain, problem.surface)
     with pytest.raises(InputError, match="needs the internal force of both ends"):
         next(vc.march(other, scheme=vc.EnergyMomentum(), dt=0.01, steps=1))
+
+
+def test_friction_brakes_a_block_that_slides(comm: Any) -> None:
+    """While all of it slides, the floor takes mu times the impulse that carries the weight."""
+    mu = 0.3
+    mesh, _ = fem.build_mesh(BlockMesh(lengths=(1.0, 0.5), divisions=(4, 2)), comm)
+    system = fem.assemble(
+        mesh,
+        STIFF,
+        initial_velocity=(3.0, 0.0),
+        loads=fem.BodyForce((0.0, -turning.GRAVITY * STIFF.rho)),
+    )
+    surface = fem.contact_surface(system, obstacle=FLOOR)
+    problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(mu))
+    normal = 0.0
+    for k, (state, report) in enumerate(vc.march(problem, dt=5e-3, steps=40)):
+        if k == 0:
+            start = turning.find_momenta(problem, report.old)
+        normal += 5e-3 * problem.surface.comm.sum(np.array([state.r_n.sum()]))[0]
+    change = turning.find_momenta(problem, state) - start
+    assert change[0] == pytest.approx(-mu * normal, rel=1e-9)
