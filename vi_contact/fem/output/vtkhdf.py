@@ -43,8 +43,8 @@ _KINDS = {
 class VTKHDF:
     """Write a frame every so many steps, and one of the initial state, all into one file.
 
-    VTK 9.3 and ParaView 5.12 read it, and newer ones. The mesh is stored once, in as many pieces as ranks began the run, so that ParaView on several ranks reads it in
-    parts. Rank 0 writes.
+    VTK 9.3 and ParaView 5.12 read it, and newer ones. The mesh is stored once, in as many pieces as
+    ranks began the run, so that ParaView on several ranks reads it in parts. Rank 0 writes.
 
     Args:
         every: a frame each so many steps.
