@@ -3,6 +3,7 @@
 
 vi_root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 vi_python=/usr/bin/python3
+[ -z "${VI_CONTACT_PYTHON:-}" ] || vi_python=$(realpath -s "$VI_CONTACT_PYTHON")  # it has its own DOLFINx: nothing is installed then
 
 vi_fail() { echo "vi_contact: $*" >&2; exit 1; }
 
@@ -11,6 +12,7 @@ vi_clean_environment() {
   unset PYTHONHOME PYTHONSTARTUP PYTHONPLATLIBDIR VIRTUAL_ENV CONDA_PREFIX PETSC_ARCH PETSC_DIR SLEPC_DIR
   export PYTHONPATH=$vi_root PYTHONNOUSERSITE=1
   export PATH=/usr/sbin:/usr/bin:/sbin:/bin:$PATH
+  [ -z "${VI_CONTACT_PYTHON:-}" ] || export PATH=$(dirname "$vi_python"):$PATH  # with the mpirun of its MPI
 }
 
 # One thread a rank; Open MPI 4 (Debian 12), 5 (Debian 13) and 6 (sid) on one machine: as root, more ranks than cores, no noise.
@@ -86,8 +88,10 @@ vi_install_packages() {
 
 vi_setup() {
   vi_clean_environment
-  vi_install_packages
-  vi_choose_real_petsc
+  if [ -z "${VI_CONTACT_PYTHON:-}" ]; then
+    vi_install_packages
+    vi_choose_real_petsc
+  fi
   vi_mpi_environment
   vi_cache_environment
 }

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # bash tests/run.sh [--quick] [arguments of pytest…]     runs the whole suite on 1, 2 and 3 ranks; installs what is missing on Debian
 #   --quick                     runs on one rank, without tests/validation and without slow tests
+#   VI_CONTACT_PYTHON=venv/bin/python      runs with another interpreter and its packages, as after pip install '.[fenicsx,dev]'
 #   VI_CONTACT_RANKS="1 2"      runs on these numbers of ranks
 #   VI_CONTACT_TIMES=FILE       appends "ranks seconds file" for every test file
 #   VI_CONTACT_TIMEOUT=1800     limits the seconds of all runs together; without it only single tests have a limit (tests/conftest.py)

@@ -16,14 +16,17 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+pytest.importorskip("petsc4py")  # whose CHOLMOD is taken
+
+from petsc_packages import needs
+
 from vi_contact.core import packages
 from vi_contact.core.algebra import Array, SerialComm
 from vi_contact.kernels import compiler, contact_last
 from vi_contact.kernels.compiler import load_cholmod, load_loops
 from vi_contact.kernels.contact_last import ContactLast
 
-pytest.importorskip("petsc4py.PETSc")  # whose CHOLMOD is taken
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, needs("cholmod")]
 EPS = np.finfo(float).eps
 
 
