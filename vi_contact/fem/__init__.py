@@ -15,14 +15,6 @@ from importlib.util import find_spec
 
 from ..core.lazy import lazy
 
-if find_spec("dolfinx") is None:
-    raise ModuleNotFoundError(
-        "vi_contact.fem needs DOLFINx, which is missing here: install it by apt (on Debian "
-        "python3-dolfinx-real, and make virtual environments with --system-site-packages), by pip "
-        "on Linux with Python 3.12 or newer (the extra vi-contact[fenicsx]) or by conda "
-        "(fenics-dolfinx of conda-forge), see docs/start/install.md",
-        name="dolfinx",
-    )
 # The wheels of PETSc and DOLFINx find the MPI library that mpi4py has loaded before.
 if find_spec("dolfinx_solver") is not None:
     import mpi4py.MPI  # noqa: F401
