@@ -108,8 +108,9 @@ def test_matrices_that_are_not_positive_definite_are_left_to_others() -> None:
 
 @pytest.fixture
 def cold(tmp_path: Path, monkeypatch: Any) -> Any:
-    """An empty cache, and a process that has loaded nothing."""
+    """An empty cache, no loops of a wheel, and a process that has loaded nothing."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(compiler, "find_shipped", lambda: None)
     forget()
     yield tmp_path / "vi_contact"
     forget()
@@ -120,6 +121,20 @@ def forget() -> None:
     compiler._load_own_loops.cache_clear()
     compiler._compile_with_cholmod.cache_clear()
     compiler._report_no_cholmod.cache_clear()
+
+
+def test_loops_of_a_wheel_are_taken(cold: Path, monkeypatch: Any, small: Path) -> None:
+    """A file that is there serves without a compiler and is asked first; a damaged one does not."""
+    file = cold.with_name("loops.abi3.so")
+    subprocess.run(["cc", "-shared", "-fPIC", str(small), "-o", str(file)], check=True)
+    monkeypatch.setenv("CC", "/no/compiler")
+    monkeypatch.setattr(compiler, "find_shipped", lambda: file)
+    assert compiler._load_own_loops().relax() == 1.0 and not cold.exists()
+    forget()
+    damaged = cold.with_name("loops.other.so")
+    damaged.write_bytes(b"no library")
+    monkeypatch.setattr(compiler, "find_shipped", lambda: damaged)
+    assert compiler._load_own_loops() is None
 
 
 @pytest.fixture
