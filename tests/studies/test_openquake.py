@@ -68,6 +68,7 @@ def test_a_model_gives_the_curves_back(tmp_path: Path) -> None:
         assert mean * math.exp(-0.5 * beta**2) == pytest.approx(curves[name].theta, rel=1e-12)
 
 
+@pytest.mark.promise("guide/studies.md", "gives the curves back to 1e-9")
 def test_openquake_reads_the_model(tmp_path: Path) -> None:
     """Its own reader gives the curve back, if it is installed."""
     nrml = pytest.importorskip("openquake.hazardlib.nrml", reason="OpenQuake is not installed")
