@@ -16,8 +16,6 @@ from ..core.errors import InputError
 from ..core.html import make_table
 from ..core.problem import ContactProblem
 from ..core.step import Columns, State
-from .dataset import make_dataset
-from .files.reading import ContactGeometry
 from .files.table import LEDGER
 
 CREATED = 0.01  # of the largest energy: more than schemes without a fault gain at sensible steps
@@ -166,6 +164,10 @@ class Solution:
         Raises:
             InputError: xarray is not installed.
         """
+        # late: only who asks needs it
+        from .dataset import make_dataset
+        from .files.reading import ContactGeometry
+
         surface = self.problem.surface
         names = ("points", "normals", "weights", "gap0", "bilateral")
         contact = ContactGeometry(*(surface.on_first(getattr(surface, name)) for name in names))

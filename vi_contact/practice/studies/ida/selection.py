@@ -99,8 +99,9 @@ def _find_files(place: str, folder: Path, values: dict[str, str]) -> tuple[Path,
         )
     # PEER names the files of a record by its number; the vertical one ends in UP, V or DWN.
     digits = number.removesuffix(".0")
-    pattern = re.compile(rf"rsn{re.escape(digits)}_.*\.at2", re.IGNORECASE)
-    found = sorted(one for one in folder.iterdir() if pattern.fullmatch(one.name))
+    begin = f"rsn{digits}_"
+    names = [one.name for one in folder.iterdir() if one.name.lower().startswith(begin)]
+    found = sorted(folder / name for name in names if name.lower().endswith(".at2"))
     if not found:
         raise InputError(f"{place}: there is no file RSN{digits}_….AT2 in '{folder}'")
     return tuple(sorted(found, key=_is_vertical))
@@ -108,7 +109,7 @@ def _find_files(place: str, folder: Path, values: dict[str, str]) -> tuple[Path,
 
 def _is_vertical(path: Path) -> bool:
     """Return whether PEER's name of a file ends as those of vertical components."""
-    return bool(re.search(r"(up|dwn|[-_]v|ver)$", path.stem, re.IGNORECASE))
+    return path.stem.lower().endswith(("up", "dwn", "-v", "_v", "ver"))
 
 
 def _read_factor(place: str, values: dict[str, str]) -> float:
