@@ -3,6 +3,10 @@
 
 vi_root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 vi_python=/usr/bin/python3
+# Another interpreter has its own DOLFINx: nothing is installed then.
+if [ -n "${VI_CONTACT_PYTHON:-}" ]; then
+  vi_python=$(realpath -s "$VI_CONTACT_PYTHON")
+fi
 
 vi_fail() {
   echo "vi_contact: $*" >&2
@@ -16,6 +20,10 @@ vi_clean_environment() {
   unset PETSC_ARCH PETSC_DIR SLEPC_DIR
   export PYTHONPATH=$vi_root PYTHONNOUSERSITE=1
   export PATH=/usr/sbin:/usr/bin:/sbin:/bin:$PATH
+  # with the mpirun of its own MPI
+  if [ -n "${VI_CONTACT_PYTHON:-}" ]; then
+    export PATH=$(dirname "$vi_python"):$PATH
+  fi
 }
 
 # One thread a rank. Open MPI 4 (Debian 12), 5 (Debian 13) and 6 (sid) on one machine: as root, with
@@ -124,8 +132,10 @@ vi_install_packages() {
 # Everything that the project's scripts need.
 vi_setup() {
   vi_clean_environment
-  vi_install_packages
-  vi_choose_real_petsc
+  if [ -z "${VI_CONTACT_PYTHON:-}" ]; then
+    vi_install_packages
+    vi_choose_real_petsc
+  fi
   vi_mpi_environment
   vi_cache_environment
 }

@@ -32,6 +32,10 @@ from typing import Any, TextIO
 
 import pytest
 
+# The wheels of DOLFINx find the MPI library that mpi4py has loaded before.
+if importlib.util.find_spec("dolfinx_solver") is not None:
+    import mpi4py.MPI  # noqa: F401
+
 # What programs print is compared with texts: it must not depend on the terminal or the language of
 # who runs the tests.
 # Gmsh sets a locale that obeys LANGUAGE

@@ -3,6 +3,8 @@
 # runs the whole suite on 1, 2 and 3 ranks, and installs what is missing on Debian.
 #   --quick                     runs one case of each test on one rank, without long and slow tests,
 #                               pages, pictures and validation
+#   VI_CONTACT_PYTHON=PYTHON    runs with another interpreter and its packages, as after
+#                               pip install '.[fenicsx,dev]' in a virtual environment
 #   VI_CONTACT_RANKS="1 2"      runs on these numbers of ranks
 #   VI_CONTACT_TIMES=FILE       appends "ranks seconds file" for every test file
 #   VI_CONTACT_TIMEOUT=1800     limits the seconds of all runs together; without it only single

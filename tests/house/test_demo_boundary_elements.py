@@ -67,7 +67,9 @@ def test_the_shear_of_histories_is_drawn_on_the_body(
     monkeypatch.setattr(deformed, "save", lambda figure, path: shown.append(figure))
     history = {"t": [1.0], "pressure": [[1.0, 2.0]], "traction_t": [[[3.0], [-3.0]]]}
     contact = SimpleNamespace(
-        points=np.array([(0.0, 0.0), (1.0, 0.0)]), normals=np.array([normal, normal])
+        points=np.array([(0.0, 0.0), (1.0, 0.0)]),
+        normals=np.array([normal, normal]),
+        frame_nodes=None,
     )
     run = SimpleNamespace(
         contact=contact, history={name: np.array(values) for name, values in history.items()}

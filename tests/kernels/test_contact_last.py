@@ -16,14 +16,17 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+pytest.importorskip("petsc4py")  # whose CHOLMOD is taken
+
+from petsc_packages import needs
+
 from vi_contact.core import packages
 from vi_contact.core.algebra import Array, SerialComm
 from vi_contact.kernels import compiler, contact_last
 from vi_contact.kernels.compiler import load_cholmod, load_loops
 from vi_contact.kernels.contact_last import ContactLast
 
-pytest.importorskip("petsc4py.PETSc")  # whose CHOLMOD is taken
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, needs("cholmod")]
 EPS = np.finfo(float).eps
 
 
@@ -105,8 +108,9 @@ def test_matrices_that_are_not_positive_definite_are_left_to_others() -> None:
 
 @pytest.fixture
 def cold(tmp_path: Path, monkeypatch: Any) -> Any:
-    """An empty cache, and a process that has loaded nothing."""
+    """An empty cache, no loops of a wheel, and a process that has loaded nothing."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(compiler, "find_shipped", lambda: None)
     forget()
     yield tmp_path / "vi_contact"
     forget()
@@ -117,6 +121,20 @@ def forget() -> None:
     compiler._load_own_loops.cache_clear()
     compiler._compile_with_cholmod.cache_clear()
     compiler._report_no_cholmod.cache_clear()
+
+
+def test_loops_of_a_wheel_are_taken(cold: Path, monkeypatch: Any, small: Path) -> None:
+    """A file that is there serves without a compiler and is asked first; a damaged one does not."""
+    file = cold.with_name("loops.abi3.so")
+    subprocess.run(["cc", "-shared", "-fPIC", str(small), "-o", str(file)], check=True)
+    monkeypatch.setenv("CC", "/no/compiler")
+    monkeypatch.setattr(compiler, "find_shipped", lambda: file)
+    assert compiler._load_own_loops().relax() == 1.0 and not cold.exists()
+    forget()
+    damaged = cold.with_name("loops.other.so")
+    damaged.write_bytes(b"no library")
+    monkeypatch.setattr(compiler, "find_shipped", lambda: damaged)
+    assert compiler._load_own_loops() is None
 
 
 @pytest.fixture

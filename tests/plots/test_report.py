@@ -425,7 +425,7 @@ def test_example_of_the_documentation(
         lines = compile(ready + "\n".join(blocks), "example.py", "exec")
         exec(lines, {"__name__": "__main__"})
     printed = capsys.readouterr().out
-    assert re.fullmatch(r"50 periods, 101 points of the loop, \d+ columns\n", printed)
+    assert re.fullmatch(r"50 periods, 101 points of the loop, \d+ columns\n6 frames, .*\n", printed)
     for picture in ("faces.png", "deformed.png"):
         assert is_drawn(tmp_path / "results" / picture)
     run = read_run(tmp_path / "results" / "engineering")

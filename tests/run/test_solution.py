@@ -8,6 +8,7 @@ from dataclasses import replace
 from html.parser import HTMLParser
 from typing import Any
 
+import numpy as np
 import pytest
 from chain import chain_problem
 from fem_problems import WALL_DT, shaken_wall
@@ -129,3 +130,35 @@ def test_a_run_without_steps_tells_its_state() -> None:
 def test_a_state_that_nobody_solved_for_has_no_certificate() -> None:
     solution = vc.simulate(chain_problem(3), scheme=vc.Midpoint(), dt=1.0, steps=0, progress=False)
     assert "certificate" not in solution.summary()
+
+
+@pytest.mark.serial
+def test_steps_and_certificates_are_tables() -> None:
+    """They parse, show the largest residual, and have no colour of their own."""
+    problem = chain_problem(3, excitation=SHAKE)
+    _, report = next(vc.march(problem, scheme=vc.Midpoint(), dt=1e-3, steps=2))
+    for shown in (report, report.certificate):
+        page = Strict(text := shown._repr_html_())
+        assert page.seen == {"table", "tr", "th", "td"}
+        assert f"{report.certificate.worst:.2e}" in page.texts and "  cone" in page.texts
+        assert "#" not in text and "rgb" not in text and "http" not in text
+
+
+def test_an_answer_between_bounds_is_a_table(comm: Any) -> None:
+    """A string of eight elements that lies on a floor at three points: docs of ``vi``."""
+    dolfinx = pytest.importorskip("dolfinx")
+    ufl = pytest.importorskip("ufl")
+    from vi_contact import vi
+    from vi_contact.fem import compat
+
+    line = dolfinx.mesh.create_interval(comm, 8, [0.0, 1.0])
+    V = compat.lagrange(line, 1)
+    own = dolfinx.fem
+    ends = own.dirichletbc(
+        0.0, own.locate_dofs_geometrical(V, lambda x: np.isclose(x[0] % 1.0, 0.0)), V
+    )
+    u, v = own.Function(V), ufl.TestFunction(V)
+    answer = vi.solve((u.dx(0) * v.dx(0) + 8.0 * v) * ufl.dx, u, lower=-0.5, bcs=[ends])
+    page = Strict(replace(answer, reason=NASTY)._repr_html_())
+    assert page.seen == {"table", "tr", "th", "td"}
+    assert "3 on the lower, 0 on the upper" in page.texts and NASTY in page.texts

@@ -17,6 +17,7 @@ import scipy.sparse as sp
 pytest.importorskip("petsc4py")
 
 from friction_cases import LAWS, OPTIONS, M, agree, random_case, rubbing, spatial, states
+from petsc_packages import needs
 from volume_cases import Case, case, pushed_block
 
 from vi_contact.core.errors import InputError, StepFailure
@@ -208,7 +209,7 @@ def test_disks_agree_with_the_condensed_route(parallel: bool, law: Any) -> None:
     ("options", "reason"),
     [
         ({"pc_type": "cholesky"}, "not symmetric"),
-        ({"ksp_type": "cg", "pc_type": "hypre"}, "not symmetric"),
+        pytest.param({"ksp_type": "cg", "pc_type": "hypre"}, "not symmetric", marks=needs("hypre")),
         ({"pc_type": "fieldsplit", "ksp_type": "gmres"}, "wrong rows"),
         ({"pc_type": "ilu"}, "does not solve the system"),
     ],

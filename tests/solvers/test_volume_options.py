@@ -16,6 +16,7 @@ import scipy.sparse as sp
 pytest.importorskip("petsc4py")
 
 from petsc4py import PETSc
+from petsc_packages import needs
 from volume_cases import Case, case, pushed_block
 
 from vi_contact.core.errors import InputError, StepFailure
@@ -243,7 +244,7 @@ def test_line_searches(pushed: Case, kind: str) -> None:
         assert kkt_residual(pushed.step, prepare(pushed, volume).solve(pushed.step)).worst <= 1e-9
 
 
-@pytest.mark.parametrize("pc", ["jacobi", "bjacobi", "hypre"])
+@pytest.mark.parametrize("pc", ["jacobi", "bjacobi", pytest.param("hypre", marks=needs("hypre"))])
 def test_iterative_linear_solver(pushed: Case, pc: str) -> None:
     """Solver notes: hypre and block Jacobi survive changes of the active set."""
     options = {"ksp_type": "cg", "pc_type": pc, "ksp_rtol": 1e-8}

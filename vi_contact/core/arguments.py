@@ -195,7 +195,7 @@ def fits(value: Any, kind: Any) -> bool:
         kind: the type, as an annotation has it, without marks.
     """
     # Of list[int], for example, the origin is list, and int stands inside.
-    origin = typing.get_origin(kind)
+    origin = _find_origin(kind)
     inside = typing.get_args(kind)
     if kind is Any:
         return True
@@ -238,7 +238,7 @@ def _fits_object(value: Any, kind: Any, origin: Any) -> bool:
 
 def describe_type(kind: Any) -> str:
     """Return the words for a type in a sentence, such as "whole numbers in a list or None"."""
-    origin = typing.get_origin(kind)
+    origin = _find_origin(kind)
     inside = typing.get_args(kind)
     if _is_union(kind):
         is_path = any(map(_is_path, inside))
@@ -264,6 +264,16 @@ def describe_type(kind: Any) -> str:
         return "a function"
     known = {float: "a real number", int: "a whole number", bool: "True or False", str: "a text"}
     return known.get(kind, f"an object of {getattr(kind, '__name__', str(kind))}")
+
+
+def _find_origin(kind: Any) -> Any:
+    """Return a type without its brackets, None where it has none.
+
+    ``NDArray[…]`` is a name for ``np.ndarray[…]`` since numpy 2.5, and was that type before.
+    """
+    origin = typing.get_origin(kind)
+    named = getattr(origin, "__value__", None)
+    return origin if named is None else typing.get_origin(named)
 
 
 def _is_union(kind: Any) -> bool:

@@ -1,7 +1,9 @@
 """Judge one step: how far an answer is from solving it; ``core.verify`` computes that."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
+
+from .html import make_table
 
 
 @dataclass(frozen=True)
@@ -56,3 +58,15 @@ class Certificate:
         """Return the largest residual; NaN counts as infinite."""
         values = vars(self).values()  # of the fields: this one is not there yet
         return max(values) if sum(values) >= 0.0 else float("inf")
+
+    def list_rows(self) -> list[tuple[str, str]]:
+        """Return (name, residual) of the largest one and of all, for tables."""
+        rows = [("certificate, largest residual", f"{self.worst:.2e}")]
+        for field in fields(self):
+            residual = getattr(self, field.name) + 0.0  # no minus before a zero
+            rows.append((f"  {field.name}", f"{residual:.2e}"))
+        return rows
+
+    def _repr_html_(self) -> str:
+        """Return a table for a notebook, which calls this by its name."""
+        return make_table(self.list_rows())

@@ -180,7 +180,7 @@ def push(path: Path) -> None:
         os.fsync(file.fileno())
 
 
-def write_all(file: Any, data: bytes) -> None:
+def write_all(file: Any, data: bytes | memoryview) -> None:
     """Write every byte to an unbuffered file: one call may write less when the disk fills up."""
     view = memoryview(data)
     while view:

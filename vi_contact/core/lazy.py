@@ -9,6 +9,7 @@ from os.path import splitext
 from types import ModuleType
 from typing import Any
 
+from .packages import explain_no_dolfinx
 from .renamed import NAMES
 
 
@@ -38,7 +39,7 @@ def lazy(
 
     def get(name: str) -> Any:
         if name in home:
-            module = import_module(home[name])
+            module = _import_home(package, name, home[name])
             if not hasattr(module, name):
                 return import_module(f"{home[name]}.{name}")  # a room that is handed on
             return getattr(module, name)
@@ -56,6 +57,21 @@ def lazy(
 
     sys.modules[package].__class__ = Room
     return public, get, lambda: public
+
+
+def _import_home(package: str, name: str, home: str) -> ModuleType:
+    """Import the module that has a name of a package.
+
+    Raises:
+        ModuleNotFoundError: a library is missing; where it comes with DOLFINx, it says how.
+    """
+    try:
+        return import_module(home)
+    except ModuleNotFoundError as error:
+        sentence = explain_no_dolfinx(f"{package}.{name}", error.name)
+        if sentence is None:
+            raise
+        raise ModuleNotFoundError(sentence, name=error.name) from error
 
 
 def _get_renamed(package: str, name: str) -> Any:

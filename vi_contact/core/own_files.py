@@ -96,11 +96,28 @@ def open_to_append(path: Path, *, make: bool = False) -> Any:
     flags = os.O_RDWR | os.O_APPEND
     if make:
         flags |= os.O_CREAT
-    file = _wrap_unbuffered(_open_descriptor(path, flags), path, "ab+")
+    return _open_sole(path, flags, "ab+")
+
+
+def open_to_change(path: Path) -> Any:
+    """Open a regular file, unbuffered, to read it and to write anywhere in it.
+
+    One that has another name too is copied, as by ``open_to_append``.
+
+    Raises:
+        InputError: there is anything but a regular file of this name.
+        OSError: names the file.
+    """
+    return _open_sole(path, os.O_RDWR, "rb+")
+
+
+def _open_sole(path: Path, flags: int, mode: str) -> Any:
+    """Open a file that has no other name, or a copy of one that has."""
+    file = _wrap_unbuffered(_open_descriptor(path, flags), path, mode)
     if count_names(file) > 1:
         file.close()
         _replace_by_copy(path)
-        file = _wrap_unbuffered(_open_descriptor(path, flags), path, "ab+")
+        file = _wrap_unbuffered(_open_descriptor(path, flags), path, mode)
     return file
 
 

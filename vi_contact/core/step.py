@@ -40,6 +40,7 @@ from .algebra import Array, EffectiveMatrix, Mask, largest, max_abs
 from .certificate import Certificate
 from .checks import describe_point, on_all, quote
 from .errors import InputError, ViContactError
+from .html import make_table
 from .problem import ContactProblem
 from .protocols import FrictionLaw, Frictionless, MassLaw
 from .surfaces import ContactSurface
@@ -497,6 +498,20 @@ class Report:
     def elastic(self) -> Array:
         """Return K u, or p(u) (n,) [N] at the end of the step, made once."""
         return self.problem.equations.internal_force(self.new.u)
+
+    def _repr_html_(self) -> str:
+        """Return a table for a notebook, which calls this by its name: no rank waits for others."""
+        surface = self.problem.surface
+        closed = f"{int(np.sum(self.new.active))} of {surface.count}"
+        rows = [
+            ("step", f"{self.new.k}"),
+            ("from t to", f"{self.old.t:.9g} s to {self.new.t:.9g} s"),
+            ("closed points of this rank" if surface.comm.size > 1 else "closed points", closed),
+            ("iterations", f"{self.result.iterations}"),
+            ("escalated", "yes" if self.escalated else "no"),
+            *self.certificate.list_rows(),
+        ]
+        return make_table(rows)
 
 
 def find_slipping(report: Report) -> Mask:

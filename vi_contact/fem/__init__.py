@@ -15,13 +15,8 @@ from importlib.util import find_spec
 
 from ..core.lazy import lazy
 
-if find_spec("dolfinx") is None:
-    raise ModuleNotFoundError(
-        "vi_contact.fem needs DOLFINx, which is missing here and which pip does not have: install "
-        "it by apt (on Debian python3-dolfinx-real, and make virtual environments with "
-        "--system-site-packages) or by conda (fenics-dolfinx of conda-forge), see "
-        "docs/start/install.md",
-        name="dolfinx",
-    )
+# The wheels of PETSc and DOLFINx find the MPI library that mpi4py has loaded before.
+if find_spec("dolfinx_solver") is not None:
+    import mpi4py.MPI  # noqa: F401
 
 __all__, __getattr__, __dir__ = lazy(__name__, __file__)

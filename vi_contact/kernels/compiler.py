@@ -1,7 +1,7 @@
 """Compile the C files of this room when they are first needed.
 
-They are kept in the user's cache, as DOLFINx keeps forms: $XDG_CACHE_HOME or ~/.cache, folder
-vi_contact.
+A wheel brings the loops compiled (``find_shipped``). All else is kept in the user's cache, as
+DOLFINx keeps forms: $XDG_CACHE_HOME or ~/.cache, folder vi_contact.
 
 There are two libraries:
 
@@ -82,7 +82,7 @@ def _load_own_loops() -> Any:
     Without one, a line in the log says so once.
     """
     try:
-        library = ctypes.CDLL(str(compile_library(LOOPS, [])))
+        library = _load_shipped() or ctypes.CDLL(str(compile_library(LOOPS, [])))
     except (OSError, RuntimeError, subprocess.SubprocessError) as problem:
         # RuntimeError: nobody's home is known
         log.info(
@@ -92,6 +92,23 @@ def _load_own_loops() -> Any:
         return None
     library.relax.restype = ctypes.c_double  # ctypes takes int where nothing is said
     return library
+
+
+def find_shipped() -> Path | None:
+    """Return the file of the loops that a wheel has brought, None in a clone."""
+    return next(iter(sorted(HERE.glob("loops.*.so"))), None)
+
+
+def _load_shipped() -> Any:
+    """Return the loops of the wheel; None without one, or where this machine cannot load it."""
+    file = find_shipped()
+    if file is None:
+        return None
+    try:
+        return ctypes.CDLL(str(file))
+    except OSError as problem:
+        log.info("the compiled loops of the wheel cannot be loaded: %s", _take_first_line(problem))
+        return None
 
 
 def _load_factoriser() -> Any:

@@ -3,7 +3,6 @@
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from html import escape
 from importlib import import_module
 from io import BytesIO
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 
 from ..core.algebra import Array
 from ..core.errors import InputError
+from ..core.html import make_table
 from ..core.problem import ContactProblem
 from ..core.step import Columns, State
 from .files.table import LEDGER
@@ -151,6 +151,28 @@ class Solution:
             self.problem, self.folder, name, t=t, frame=frame, continuous=continuous
         )
 
+    def to_xarray(self) -> Any:
+        """Return the histories as an xarray Dataset with units and long names. Collective.
+
+        The coordinate ``t`` [s] names the rows. Arrays of contact points have the dimension
+        ``point``, whose coordinates are x, y, z [m], normals, weights and initial gaps. They are
+        those of rank 0, as in ``history``.
+
+        >>> ds = solution.to_xarray()  # doctest: +SKIP
+        >>> ds.u_x_top.sel(t=0.1, method="nearest"), ds.pressure.max("t")  # doctest: +SKIP
+
+        Raises:
+            InputError: xarray is not installed.
+        """
+        # late: only who asks needs it
+        from .dataset import make_dataset
+        from .files.reading import ContactGeometry
+
+        surface = self.problem.surface
+        names = ("points", "normals", "weights", "gap0", "bilateral")
+        contact = ContactGeometry(*(surface.on_first(getattr(surface, name)) for name in names))
+        return make_dataset(self.history, self.columns, self.facts, contact)
+
     def summary(self) -> str:
         """Return the run in a few lines for people."""
         lines = []
@@ -173,17 +195,11 @@ class Solution:
 
         The figure is in the text, so that it refers to nothing outside.
         """
-        rows = ""
-        for name, value in _list_entries(self.facts):
-            if name:
-                rows += f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>"
-            else:
-                rows += f'<tr><td colspan="2">{escape(value)}</td></tr>'
         image = BytesIO()
         self.plot().savefig(image, format="png", dpi=70)
         picture = b64encode(image.getvalue()).decode()
         return (
-            f'<table>{rows}</table><img alt="histories of the run" '
+            f'{make_table(_list_entries(self.facts))}<img alt="histories of the run" '
             f'src="data:image/png;base64,{picture}">'
         )
 

@@ -26,6 +26,7 @@ from ..core.certificate import Certificate
 from ..core.checks import instance, quote, whole
 from ..core.collective import agree
 from ..core.errors import InputError, StepFailure
+from ..core.html import make_table
 from ..fem import compat
 from ..fem.body.form_checks import refuse_complex
 from ..fem.mesh.communicators import MpiComm, give_back, keep_communicator
@@ -86,6 +87,20 @@ class Result:
     method: str
     reason: str
     seconds: Mapping[str, float]
+
+    def _repr_html_(self) -> str:
+        """Return a table for a notebook, which calls this by its name."""
+        lower, upper = self.active
+        rows = [
+            ("unknowns on bounds", f"{lower} on the lower, {upper} on the upper"),
+            ("iterations", f"{self.iterations} (inner: {self.inner})"),
+            ("method", self.method),
+            ("reason", self.reason),
+            *self.certificate.list_rows(),
+        ]
+        for name, value in self.seconds.items():
+            rows.append((f"{name} [s]", f"{value:.3g}"))
+        return make_table(rows)
 
 
 class Problem:

@@ -33,7 +33,8 @@ def refuse_complex(owner: str) -> None:
     if np.issubdtype(PETSc.ScalarType, np.complexfloating):
         raise InputError(
             f"{owner}: this PETSc computes with complex numbers, of which none is less than "
-            "another; use DOLFINx with a PETSc of real numbers (Debian: python3-dolfinx-real)"
+            "another; use DOLFINx with a PETSc of real numbers (Debian: python3-dolfinx-real; "
+            "PyPI: dolfinx-solver-real)"
         )
 
 

@@ -134,17 +134,11 @@ class XDMF:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        for name in self.functions:
-            column_name("name of a Function", name)
-            if name in TAKEN:
-                raise InputError(
-                    f"XDMF: functions has the name '{name}', which frames have already; give "
-                    "another"
-                )
+        check_names("XDMF", self.functions, TAKEN)
 
     def open(
         self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]
-    ) -> "FrameWriter":
+    ) -> "XDMFWriter":
         """Write the mesh, and return what writes the frames. Collective.
 
         Args:
@@ -153,22 +147,8 @@ class XDMF:
             kept: step -> time [s] of frames with which the run goes on; those of them that are in
                 the folder stay, and all others are removed.
         """
-        space = problem.system.space
-        own = None
-        if isinstance(space, MatrixSpace):
-            if self.functions:
-                raise InputError(
-                    "XDMF: functions are on a mesh, and the system was not made of one; leave them "
-                    "out"
-                )
-            cells = Cells("Polyvertex", space.nodes[:, None], space.nodes)
-        else:
-            from .own_functions import OwnFunctions  # late: the other frames need no DOLFINx
-
-            cells = _cells_of_body(problem)
-            if self.functions:
-                own = OwnFunctions(problem, self.functions)
-        return FrameWriter(problem, folder, kept, self.frames_per_file, cells, own)
+        values = FrameValues("XDMF", problem, self.functions)
+        return XDMFWriter(values, folder, kept, self.frames_per_file)
 
 
 @dataclass(frozen=True)
@@ -188,7 +168,135 @@ class Cells:
     von_mises: VonMises | None = None
 
 
-class FrameWriter:
+def check_names(owner: str, functions: Mapping[str, Any], taken: Sequence[str]) -> None:
+    """Raise InputError for a name of a Function that frames cannot have, or have already.
+
+    Args:
+        owner: the beginning of messages.
+        functions: the user's, by name.
+        taken: names that frames have already.
+    """
+    for name in functions:
+        column_name("name of a Function", name)
+        if name in taken:
+            raise InputError(
+                f"{owner}: functions has the name '{name}', which frames have already; give another"
+            )
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Hold the mesh of all ranks on rank 0, in the order of the input mesh.
+
+    Attributes:
+        kind: XDMF's name of the cells.
+        points: (n, 3) nodes [m].
+        cells: (c, v) their nodes, in VTK's order.
+        owners: (c,) the rank of each cell.
+    """
+
+    kind: str
+    points: Array
+    cells: Indices
+    owners: Indices
+
+
+class FrameValues:
+    """Compute what a frame holds, on all ranks, and hand it to rank 0.
+
+    Attributes:
+        comm: of the ranks.
+        names: of the nodal vectors.
+        grid: on rank 0; on others its arrays are empty.
+        has_stress: whether frames have the von Mises stress.
+        own: the user's Functions, None without.
+    """
+
+    def __init__(self, owner: str, problem: ContactProblem, functions: Mapping[str, Any]) -> None:
+        """Gather the mesh. Collective.
+
+        Args:
+            owner: the beginning of messages.
+            problem: that of the run.
+            functions: the user's, by name.
+        """
+        space: Any = problem.system.space
+        self.own: OwnFunctions | None = None
+        if isinstance(space, MatrixSpace):
+            if functions:
+                raise InputError(
+                    f"{owner}: functions are on a mesh, and the system was not made of one; leave "
+                    "them out"
+                )
+            cells = Cells("Polyvertex", space.nodes[:, None], space.nodes)
+        else:
+            from . import own_functions  # late: the other frames need no DOLFINx
+
+            cells = _cells_of_body(owner, problem)
+            if functions:
+                self.own = own_functions.OwnFunctions(owner, problem, functions)
+        self.comm = space.comm
+        self.names = _VECTORS + (_RUBBING if problem.frictional else ())
+        self.has_stress = cells.von_mises is not None
+        self._problem = problem
+        self._space = space
+        self._cell_numbers = cells.numbers
+        self._von_mises = cells.von_mises
+        owners = np.full(len(cells.numbers), space.comm.rank)
+        self.grid = Grid(
+            cells.kind,
+            on_first(space.comm, space.nodes, _pad_axes(space.points)),
+            on_first(space.comm, cells.numbers, cells.nodes),
+            on_first(space.comm, cells.numbers, owners),
+        )
+
+    def gather(
+        self, state: State, acceleration: Array, report: Report | None
+    ) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Return the values of a frame on rank 0, by name: of nodes, and of cells. Collective.
+
+        Args:
+            state: at the end of the step.
+            acceleration: (n,) of the step, in the rotated basis [m/s²].
+            report: that of the step, which tells what slips; None for the initial state.
+        """
+        problem = self._problem
+        space = self._space
+
+        # motion of the nodes and stress of the cells
+        vectors = [
+            space.expand(problem.cartesian(x), state.t, derivative)
+            for derivative, x in enumerate((state.u, state.v, acceleration))
+        ]
+        cellwise = {}
+        if self._von_mises is not None:
+            stress = self._von_mises(vectors[0], state.t)
+            cellwise["von_mises"] = on_first(space.comm, self._cell_numbers, stress)
+
+        # contact: 1 open, 2 sticking, 3 slipping
+        slipping = np.zeros(problem.surface.count, dtype=bool)
+        if problem.frictional and report is not None:
+            slipping = find_slipping(report)
+        pressure, status = nodal_contact(
+            problem, state, np.where(state.active, np.where(slipping, 3, 2), 1)
+        )
+        if problem.frictional:
+            vectors += [between(problem, nodal) for nodal in compute_rubbing(problem, state)]
+
+        # the rows of all nodes, in the order of ``names``, and the user's Functions
+        rows = np.hstack([*(_pad_axes(nodal) for nodal in vectors), pressure, status])
+        rows = on_first(space.comm, space.nodes, rows)
+        nodal = {name: rows[:, 3 * i : 3 * i + 3] for i, name in enumerate(self.names)}
+        nodal["contact_pressure"] = rows[:, -2]
+        nodal["contact_status"] = rows[:, -1].astype(np.int32)
+        if self.own is not None:
+            for name, values in self.own.gather_values(state).items():
+                place = cellwise if self.own.kinds[name].in_cells else nodal
+                place[name] = values
+        return nodal, cellwise
+
+
+class XDMFWriter:
     """Write the frames of a run.
 
     A frame is written into a file of its own, at the path "/". Each time ``per_file`` frames have
@@ -197,41 +305,23 @@ class FrameWriter:
     """
 
     def __init__(
-        self,
-        problem: ContactProblem,
-        folder: Path,
-        kept: Mapping[int, float],
-        per_file: int,
-        cells: Cells,
-        own: "OwnFunctions | None" = None,
+        self, values: FrameValues, folder: Path, kept: Mapping[int, float], per_file: int
     ) -> None:
         """Write the mesh, and the index of the frames that stay. Collective.
 
         Args:
-            problem: that of the run.
+            values: what frames hold.
             folder: that of the run.
             kept: step -> time [s] of frames with which the run goes on.
             per_file: how many frames are collected in a file.
-            cells: those of the mesh, or points.
-            own: the user's Functions, None without.
         """
-        space: Any = problem.system.space
-        self._problem = problem
-        self._space = space
+        self._values = values
         self._folder = folder
         self._per_file = per_file
-        self._names = _VECTORS + (_RUBBING if problem.frictional else ())
-        self._type = cells.kind
-        self._cell_numbers = cells.numbers
-        self._von_mises = cells.von_mises
-        self._own = own
         self._own_names: dict[int, list[str]] = {}  # of the frame of each step
-        points = on_first(space.comm, space.nodes, _pad_axes(space.points))
-        rows = on_first(space.comm, self._cell_numbers, cells.nodes)
-        self._shape = (len(points), *rows.shape)
-        on_root(space.comm, partial(self._start, points, rows, kept))
+        on_root(values.comm, partial(self._start, values.grid.points, values.grid.cells, kept))
 
-    def _start(self, points: Array, cells: Array, kept: Mapping[int, float]) -> None:
+    def _start(self, points: Array, cells: Indices, kept: Mapping[int, float]) -> None:
         """Write the mesh and the index of the frames that are kept, on rank 0."""
         folder = make_inner_folder(self._folder, FIELDS)
 
@@ -279,64 +369,27 @@ class FrameWriter:
             acceleration: (n,) of the step, in the rotated basis [m/s²].
             report: that of the step, which tells what slips; None for the initial state.
         """
-        problem = self._problem
-        space = self._space
+        nodal, cellwise = self._values.gather(state, acceleration, report)
+        on_root(self._values.comm, partial(self._write, state, nodal | cellwise))
 
-        # motion of the nodes and stress of the cells
-        vectors = [
-            space.expand(problem.cartesian(x), state.t, derivative)
-            for derivative, x in enumerate((state.u, state.v, acceleration))
-        ]
-        stress = None
-        if self._von_mises is not None:
-            own = self._von_mises(vectors[0], state.t)
-            stress = on_first(space.comm, self._cell_numbers, own)
-
-        # contact: 1 open, 2 sticking, 3 slipping
-        slipping = np.zeros(problem.surface.count, dtype=bool)
-        if problem.frictional and report is not None:
-            slipping = find_slipping(report)
-        pressure, status = nodal_contact(
-            problem, state, np.where(state.active, np.where(slipping, 3, 2), 1)
-        )
-        if problem.frictional:
-            vectors += [between(problem, nodal) for nodal in compute_rubbing(problem, state)]
-
-        # rank 0 writes the rows of all, in the order of ``_names``, and the user's Functions
-        rows = np.hstack([*(_pad_axes(nodal) for nodal in vectors), pressure, status])
-        functions = {} if self._own is None else self._own.gather_values(state)
-        on_root(
-            space.comm,
-            partial(self._write, state, on_first(space.comm, space.nodes, rows), stress, functions),
-        )
-
-    def _write(
-        self, state: State, nodal: Array, stress: Array | None, functions: Mapping[str, Array]
-    ) -> None:
+    def _write(self, state: State, arrays: Mapping[str, Array]) -> None:
         """Write a frame and the index that names it, on rank 0.
 
         Args:
             state: that of the frame.
-            nodal: (nodes, 3 vectors + 2) values at all nodes.
-            stress: (cells,) von Mises stresses [Pa], None without.
-            functions: values of the user's Functions by name, (nodes or cells, components).
+            arrays: values at all nodes or cells by name.
         """
 
         def fill(file: Any) -> None:
-            for i, name in enumerate(self._names):
-                file[name] = nodal[:, 3 * i : 3 * i + 3]
-            file["contact_pressure"] = nodal[:, -2]
-            file["contact_status"] = nodal[:, -1].astype(np.int32)
-            if stress is not None:
-                file["von_mises"] = stress
-            for name, values in functions.items():
+            for name, values in arrays.items():
                 file[name] = values
 
         path = inner_folder(self._folder, FIELDS) / f"frame_{state.k:06d}.h5"
         hdf5_atomically(path, fill)
         self._times[state.k] = state.t
         self._places[state.k] = (path, "/")
-        self._own_names[state.k] = list(functions)
+        own = self._values.own
+        self._own_names[state.k] = [] if own is None else own.names
         single = [k for k, (_, group) in self._places.items() if group == "/"]
         full = len(single) >= self._per_file > 1
         if full:
@@ -360,19 +413,21 @@ class FrameWriter:
 
         A frame of an earlier run, which this one goes on with, may have none.
         """
-        if self._own is None:
+        own = self._values.own
+        if own is None:
             return {}
         if k not in self._own_names:
             path, group = self._places[k]
             with open_hdf5(path) as file:
-                self._own_names[k] = [name for name in self._own.names if name in file[group]]
+                self._own_names[k] = [name for name in own.names if name in file[group]]
         # what the user's function of the state returns is known from its first frame on
-        kinds = self._own.kinds
+        kinds = own.kinds
         return {name: kinds[name] for name in self._own_names[k] if name in kinds}
 
     def _describe_frame(self, k: int, t: float) -> str:
         """Return XDMF's Grid of the frame of step k at time t [s]."""
-        nodes, cells, corners = self._shape
+        nodes = len(self._values.grid.points)
+        cells, corners = self._values.grid.cells.shape
         path, group = self._places[k]
         mesh = f"{FIELDS}/mesh.h5"
         frame = f"{FIELDS}/{path.name}:{group.rstrip('/')}"
@@ -388,17 +443,17 @@ class FrameWriter:
                 f'Center="{center}">{item}</Attribute>\n'
             )
 
-        attributes = [describe(name, "Node", nodes, 3) for name in self._names]
+        attributes = [describe(name, "Node", nodes, 3) for name in self._values.names]
         attributes.append(describe("contact_pressure", "Node", nodes))
         attributes.append(describe("contact_status", "Node", nodes, number="Int", size=4))
-        if self._von_mises is not None:
+        if self._values.has_stress:
             attributes.append(describe("von_mises", "Cell", cells))
         for name, own_kind in self._find_own_kinds(k).items():
             shape = (cells if own_kind.in_cells else nodes, *own_kind.components)
             attributes.append(describe(name, "Cell" if own_kind.in_cells else "Node", *shape))
         return (
             f'<Grid Name="step {k}" GridType="Uniform"><Time Value="{t!r}"/>\n'
-            f'<Topology TopologyType="{self._type}" NumberOfElements="{cells}" '
+            f'<Topology TopologyType="{self._values.grid.kind}" NumberOfElements="{cells}" '
             f'NodesPerElement="{corners}">'
             f"{_describe_data((cells, corners), f'{mesh}:/cells', 'Int')}</Topology>\n"
             '<Geometry GeometryType="XYZ">'
@@ -524,17 +579,23 @@ def _pad_axes(nodal: Array) -> Array:
     return np.pad(nodal, ((0, 0), (0, 3 - nodal.shape[1])))
 
 
-def _cells_of_body(problem: ContactProblem) -> Cells:
-    """Return the cells of a mesh by the numbers of their nodes, in VTK's order. Collective."""
+def _cells_of_body(owner: str, problem: ContactProblem) -> Cells:
+    """Return the cells of a mesh by the numbers of their nodes, in VTK's order. Collective.
+
+    Args:
+        owner: the beginning of messages.
+        problem: that of the run.
+    """
     from .. import compat
     from ..body.space import space_of, warn_of_other_matrices
 
-    space = space_of("XDMF", problem.system)
+    space = space_of(owner, problem.system)
     if space.forms.tells_stress:
-        warn_of_other_matrices("XDMF, von_mises", problem.system, "K")
+        warn_of_other_matrices(f"{owner}, von_mises", problem.system, "K")
     elif space.comm.rank == 0:
         log.info(
-            "XDMF: forms=… have no stress, so frames have no von_mises: give fem.Forms(…, stress=)"
+            "%s: forms=… have no stress, so frames have no von_mises: give fem.Forms(…, stress=)",
+            owner,
         )
     mesh = space.mesh
     stress = VonMises(space.forms) if space.forms.tells_stress else None

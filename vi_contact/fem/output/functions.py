@@ -26,6 +26,7 @@ from ...core.own_files import inner_folder, is_own, read_bytes
 from ...core.problem import ContactProblem
 from ...core.state_checks import check_problem_given, check_sizes
 from ...core.step import State
+from ...core.vtkhdf import FIELDS_VTKHDF, open_series
 from .. import compat
 from ..body.space import FemSpace, space_of, warn_of_other_matrices
 from .fields import (
@@ -131,7 +132,7 @@ def read_function(
 ) -> Any:
     """Return a frame in the folder of a run, as ``as_function`` returns a state. Collective.
 
-    The run, with ``fields=fem.XDMF(…)``, may have had any number of ranks.
+    The run, with ``fields=fem.XDMF(…)`` or ``fem.VTKHDF(…)``, may have had any number of ranks.
 
     Args:
         problem: that of the run.
@@ -310,6 +311,8 @@ def _read_stored(
         InputError: there are no fields, or no such frame, or files are damaged.
     """
     if not is_own(folder / FIELDS_INDEX):
+        if is_own(folder / FIELDS_VTKHDF):
+            return _read_series(folder, name, t, frame)
         raise InputError(
             f"'{folder}' has no {FIELDS_INDEX}: run again with out and fields=fem.XDMF(every=10)"
         )
@@ -318,9 +321,7 @@ def _read_stored(
         index: Any = ET.fromstring(read_bytes(folder / FIELDS_INDEX))
         attributes = {attribute.get("Name") for attribute in index.iterfind(".//Attribute")}
         if attributes and name not in attributes:
-            raise InputError(
-                f"the frames in '{folder}' have no '{name}', as those of a run without friction"
-            )
+            raise _missing(folder, name)
         places = []
         for grid in index.findall(".//Grid[@GridType='Uniform']"):
             time = float(grid.find("Time").get("Value"))
@@ -352,6 +353,25 @@ def _read_stored(
         raise InputError(
             f"the fields in '{folder}' are incomplete or damaged ({error}): run again"
         ) from error
+
+
+def _read_series(
+    folder: Path, name: str, t: float | None, frame: int | None
+) -> tuple[Array, Array, float]:
+    """Return what ``_read_stored`` does, of a run with one file for all frames."""
+    with open_series(folder / FIELDS_VTKHDF) as series:
+        if name not in series.names:
+            raise _missing(folder, name)
+        times = [float(time) for time in series.times]
+        place = _choose_frame(times, t, frame)
+        return series.points, series.read(name, place), times[place]
+
+
+def _missing(folder: Path, name: str) -> InputError:
+    """Return the error about a quantity that the frames of a folder have not."""
+    return InputError(
+        f"the frames in '{folder}' have no '{name}', as those of a run without friction"
+    )
 
 
 def _choose_frame(times: list[float], t: float | None, frame: int | None) -> int:

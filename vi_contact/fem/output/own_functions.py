@@ -46,24 +46,26 @@ class OwnFunctions:
         kinds: name -> what it is; of a function of the state once it has returned something.
     """
 
-    def __init__(self, problem: ContactProblem, given: Mapping[str, Any]) -> None:
+    def __init__(self, owner: str, problem: ContactProblem, given: Mapping[str, Any]) -> None:
         """Look at the Functions. Collective.
 
         Args:
+            owner: the beginning of messages.
             problem: that of the run, on whose mesh they are.
             given: name -> Function, or a function of a state that returns one.
 
         Raises:
             InputError: of another mesh, or of a space that frames cannot hold.
         """
-        self._space: FemSpace = space_of("XDMF", problem.system)
+        self._space: FemSpace = space_of(owner, problem.system)
+        self._owner = owner
         self._given = dict(given)
         self._places: dict[str, tuple[Any, Indices]] = {}
         self.names = list(given)
         self.kinds: dict[str, Kind] = {}
         for name, function in given.items():
             if hasattr(function, "function_space"):
-                self.kinds[name] = _find_kind(f"XDMF: '{name}'", function, self._space)
+                self.kinds[name] = _find_kind(f"{owner}: '{name}'", function, self._space)
 
     def gather_values(self, state: State) -> dict[str, Array]:
         """Return the values of all on rank 0, in the order of the input mesh. Collective."""
@@ -82,7 +84,7 @@ class OwnFunctions:
             name: in the frames.
             function: what the user gave, or what the user's function returned.
         """
-        owner = f"XDMF: '{name}'"
+        owner = f"{self._owner}: '{name}'"
         provides(owner, "it", function, ("function_space", "x"), REMEDY)
         V = function.function_space
         kind = _find_kind(owner, function, self._space)

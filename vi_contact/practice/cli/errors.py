@@ -16,6 +16,7 @@ from ...core.algebra import SerialComm
 from ...core.checks import SHOWN, quote
 from ...core.errors import InputError, ViContactError, is_of_memory
 from ...core.files import describe_os_error
+from ...core.packages import explain_no_dolfinx
 
 PATIENCE = 30.0  # seconds between the first rank that has failed and the last
 LIBRARIES = ("dolfinx", "ufl", "basix", "petsc4py", "mpi4py", "h5py", "gmsh", "matplotlib", "tqdm")
@@ -161,7 +162,7 @@ def _explain(error: Exception) -> str | None:
     if isinstance(error, OSError):
         return describe_os_error(error)
     if isinstance(error, ModuleNotFoundError) and error.name in LIBRARIES:
-        return (
+        return explain_no_dolfinx("this command", error.name) or (
             f"{error.name} is needed and this Python does not find it: install it "
             "(docs/start/install.md)"
         )

@@ -17,9 +17,9 @@ from ...core.algebra import Array, Indices, Mask
 from ...core.arguments import check_arguments
 from ...core.checks import number, optional
 from ...core.errors import InputError
-from ...core.files import list_frames, write_output
+from ...core.files import write_output
 from ...run.files.reading import ContactGeometry, RunFolder
-from .deformed import compute_normals, contact_states, find_nearest, read_frames
+from .deformed import compute_normals, contact_states, find_nearest, has_frames, read_frames
 from .faces import (
     Face,
     Painter,
@@ -590,7 +590,7 @@ def draw_run(
         the pictures that were written.
     """
     pictures = []
-    if list_frames(run.folder) and read_frames(run).cells.shape[1] > 2:  # no bars
+    if has_frames(run.folder) and read_frames(run).cells.shape[1] > 2:  # no bars
         path = Path(out) / "deformed.png"
         pictures.append(plot_deformed(run, path, times=times, magnified=magnified, title=title))
     contact = run.contact

@@ -19,7 +19,7 @@ from ...core.arguments import check_arguments
 from ...core.checks import array
 from ...core.errors import InputError, is_of_machine
 from ...core.files import FIELDS, list_frames, open_hdf5
-from ...core.own_files import inner_folder
+from ...core.vtkhdf import FIELDS_VTKHDF, StoredSeries, list_steps
 from ...meshes.rows import SIDES, number_parts
 from ...run.files.reading import RunFolder, read_run
 from ...run.recorders.contact_parts import Geometry, make_tangent_vectors
@@ -45,13 +45,13 @@ class StoredFrames:
         points: (n, d) vertices [m].
         cells: (c, corners) their vertices.
         t: (f,) times [s].
-        places: (file, group in it) of each time.
+        places: (file, group in it) of each time; of VTKHDF (file, number of the frame in it).
     """
 
     points: Array
     cells: Indices
     t: Array
-    places: tuple[tuple[Path, str], ...]
+    places: tuple[tuple[Path, str | int], ...]
 
     def at(self, t: float) -> tuple[float, Array, Array]:
         """Return (its time [s], u (n, d) [m], von Mises stress (c,) [Pa]) at t.
@@ -59,12 +59,19 @@ class StoredFrames:
         They are those of the frame nearest to t; stresses are NaN where the run has none.
         """
         (row,) = find_nearest(self.t, [t])
-        path, group = self.places[row]
+        path, place = self.places[row]
+        unknown = np.full(len(self.cells), np.nan)
         with _open_fields(path) as file:
-            frame = file[group]
-            u = frame["u"][:]
-            unknown = np.full(len(self.cells), np.nan)
-            stress = frame["von_mises"][:] if "von_mises" in frame else unknown
+            if isinstance(place, int):
+                series = StoredSeries(file)
+                u = series.read("u", place)
+                stress = unknown
+                if "von_mises" in series.names:
+                    stress = series.read("von_mises", place)
+            else:
+                frame = file[place]
+                u = frame["u"][:]
+                stress = frame["von_mises"][:] if "von_mises" in frame else unknown
             if u.shape != (len(self.points), 3) or stress.shape != unknown.shape:
                 raise ValueError("the numbers of nodes or cells are not those of the mesh")
             return float(self.t[row]), u[:, : self.points.shape[1]], stress
@@ -214,7 +221,7 @@ def read_frames(run: RunFolder | str | Path) -> StoredFrames:
         InputError: the folder has no fields, or they are damaged.
     """
     folder = run.folder if isinstance(run, RunFolder) else Path(run)
-    places = list_frames(folder)
+    places = _list_places(folder)
     if places:
         history = run.history if isinstance(run, RunFolder) else read_run(folder).history
         times = dict(zip(history["k"].astype(int).tolist(), history["t"].tolist(), strict=True))
@@ -224,15 +231,40 @@ def read_frames(run: RunFolder | str | Path) -> StoredFrames:
         raise InputError(
             f"no frames in {folder / FIELDS}: run it with out and fields=fem.XDMF(every=...)"
         )
-    points, cells = _read_mesh(folder)
+    path, _ = next(iter(places.values()))
+    if path.name != FIELDS_VTKHDF:
+        path = path.with_name("mesh.h5")
+    points, cells = _read_mesh(path)
     return StoredFrames(points, cells, np.array([times[k] for k in places]), tuple(places.values()))
 
 
-def _read_mesh(folder: Path) -> tuple[Array, Indices]:
-    """Read the vertices (n, d) [m] of a run, and those of each cell (c, corners)."""
-    with _open_fields(inner_folder(folder, FIELDS) / "mesh.h5") as file:
-        points = file["points"][:]
-        cells = file["cells"][:]
+def has_frames(folder: Path) -> bool:
+    """Return whether a run wrote fields."""
+    return bool(_list_places(folder))
+
+
+def _list_places(folder: Path) -> dict[int, tuple[Path, str | int]]:
+    """Return step -> where its frame is: XDMF's, or without those VTKHDF's."""
+    places: dict[int, tuple[Path, str | int]] = {**list_frames(folder)}
+    if not places:
+        path = folder / FIELDS_VTKHDF
+        places = {k: (path, i) for i, k in enumerate(list_steps(folder))}
+    return places
+
+
+def _read_mesh(path: Path) -> tuple[Array, Indices]:
+    """Read the vertices (n, d) [m] of a run, and those of each cell (c, corners).
+
+    path: of the mesh of XDMF, or of the file of VTKHDF.
+    """
+    with _open_fields(path) as file:
+        if path.name == FIELDS_VTKHDF:
+            series = StoredSeries(file)
+            points = series.points
+            cells = series.read_cells()
+        else:
+            points = file["points"][:]
+            cells = file["cells"][:]
         if (
             points.ndim != 2
             or points.shape[1] != 3

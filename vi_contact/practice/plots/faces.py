@@ -12,7 +12,6 @@ from ...core.algebra import Array, Indices
 from ...core.arguments import check_arguments
 from ...core.corners import FEATURE_ANGLE
 from ...core.errors import InputError
-from ...core.files import list_frames
 from ...core.step import AXES
 from ...meshes.rows import number_parts
 from ...run.files.reading import RunFolder
@@ -25,6 +24,7 @@ from .deformed import (
     compute_tangents,
     contact_states,
     find_nearest,
+    has_frames,
     read_frames,
 )
 from .histories import STYLE, History, escape_dollars, length_unit, require_matplotlib, save, scale
@@ -366,7 +366,7 @@ def plot_faces(
         raise InputError(
             f"'{run.folder}' is not a finished run in space with Contact(): finish one that has it"
         )
-    if list_frames(run.folder):
+    if has_frames(run.folder):
         sides, _ = read_frames(run).facing(contact)
     else:
         sides = np.zeros((0, 3), dtype=np.int64)

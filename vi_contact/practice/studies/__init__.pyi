@@ -3,7 +3,9 @@ from .cases.case import read_case as read_case
 from .ida.fragility import fragility_curve as fragility_curve
 from .ida.ida import IDA as IDA
 from .ida.ida import run_ida as run_ida
+from .ida.openquake import write_fragility_model as write_fragility_model
 from .ida.runs import record_set as record_set
+from .ida.selection import read_selection as read_selection
 from .profiles import profile as profile
 from .refinement import refine as refine
 from .report import comparisons as comparisons

@@ -37,6 +37,7 @@ from ...core.files import (
     to_json,
     write_atomically,
 )
+from ...core.hdf5_changes import name_undo
 from ...core.own_files import (
     count_names,
     inner_folder,
@@ -49,6 +50,7 @@ from ...core.own_files import (
     same_file,
 )
 from ...core.version import __version__
+from ...core.vtkhdf import FIELDS_VTKHDF
 
 log = logging.getLogger(__name__)
 FIRST = b"t,k,iterations,certificate,escalated"  # how every history.csv begins
@@ -68,12 +70,15 @@ MESH = "mesh.h5"  # in the folder of fields
 STAGES = "stages"  # the folder of the runs of stages before the last one
 MODEL = "model.json"  # a description of the model
 SUMMARY = "summary.json"
+UNDO = name_undo(Path(FIELDS_VTKHDF)).name
 # the files of a run
 FILES = (
     ABOUT,
     CHECKPOINT,
     COLUMNS,
     FIELDS_INDEX,
+    FIELDS_VTKHDF,
+    UNDO,
     HISTORY_CSV,
     HISTORY_H5,
     JOURNAL,
@@ -240,7 +245,7 @@ def clear(folder: Path) -> None:
     """
     if not is_marked(folder):
         return
-    for name in (CHECKPOINT, JOURNAL, HISTORY_H5, SUMMARY, FIELDS_INDEX):
+    for name in (CHECKPOINT, JOURNAL, HISTORY_H5, SUMMARY, FIELDS_INDEX, UNDO, FIELDS_VTKHDF):
         remove(folder / name)
     for frame in _list_frames(inner_folder(folder, FIELDS)):
         remove(frame)

@@ -91,6 +91,16 @@ class RunFolder:
     facts: Mapping[str, Any]
     contact: ContactGeometry | None
 
+    def to_xarray(self) -> Any:
+        """Return the histories as an xarray Dataset, as ``Solution.to_xarray`` does.
+
+        Raises:
+            InputError: xarray is not installed.
+        """
+        from ..dataset import make_dataset  # late: only who asks needs xarray
+
+        return make_dataset(self.history, self.columns, self.facts, self.contact)
+
 
 @check_arguments
 def read_run(folder: str | Path) -> RunFolder:

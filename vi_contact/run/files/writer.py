@@ -15,8 +15,10 @@ import numpy as np
 
 from ...core.algebra import Array, SerialComm, largest
 from ...core.files import list_frames, on_root, push, to_json, write_atomically
+from ...core.hdf5_changes import undo_broken_change
 from ...core.problem import ContactProblem
 from ...core.step import Report, Row, State
+from ...core.vtkhdf import FIELDS_VTKHDF, list_steps
 from .checkpoint import RestartPoint, write_checkpoint
 from .folder import CHECKPOINT, LOG, SUMMARY, clear, remove_litter, take
 from .history import GEOMETRY, HistoryFiles
@@ -43,7 +45,7 @@ class OpenFields(Protocol):
 
 
 class FieldWriter(Protocol):
-    """Write field output: ``fem.XDMF`` is one."""
+    """Write field output: ``fem.XDMF`` and ``fem.VTKHDF`` do."""
 
     @property
     def every(self) -> int:
@@ -57,6 +59,12 @@ class FieldWriter(Protocol):
             folder: of the run.
             kept: step -> time [s] of the frames that are there and stay.
         """
+
+
+def _read_frame_times(folder: Path) -> dict[int, float]:
+    """Return step -> time [s] of the frames in a run folder that have a row in the histories."""
+    undo_broken_change(folder / FIELDS_VTKHDF)
+    return read_times(folder, {*list_frames(folder), *list_steps(folder)})
 
 
 class Writer:
@@ -127,7 +135,7 @@ class Writer:
         if self._settings is not None:
             frames: Mapping[int, float] = {}
             if self._continued:
-                frames = on_root(self._comm, lambda: read_times(folder, list_frames(folder))) or {}
+                frames = on_root(self._comm, partial(_read_frame_times, folder)) or {}
             self._fields = self._settings.open(self._problem, folder, frames)
             if not self._continued:
                 self._fields.write(state, np.zeros_like(state.u))

@@ -533,7 +533,9 @@ class Case:
         rising = any(
             node.callee.name == "upgoing" and "motion" not in node.arguments for node in calls
         )
-        tables = tuple(len(getattr(one, "parts", ())) for one in surfaces)
+        tables = () if "contact" not in self.nodes else [
+            len(getattr(one, "parts", ())) for one in surfaces
+        ]
         return Parts(system, surface, tags, "gravity" in self.nodes, moved=rising, tables=tables)
 
     def meshed(self, comm: Any) -> tuple[Any, Tags]:

@@ -4,8 +4,8 @@ One structure is put under many motions, each at many intensities; the result is
 
 Vamvatsikos and Cornell, Earthquake Engng Struct. Dyn. 31 (2002). In the folder of a study, beside
 ``ida.csv``, ``columns.json`` and ``ida.png``: ``fragility.csv`` and ``fragility.png``, where there
-are limits; ``ida.json``, the case and the records, so that no other study is mixed in, and
-``runs/NAME_xSCALE``, the folder of every run, with its row.
+are limits, with ``fragility.xml`` for OpenQuake; ``ida.json``, the case and the records, so that no
+other study is mixed in, and ``runs/NAME_xSCALE``, the folder of every run, with its row.
 """
 
 import hashlib
@@ -36,8 +36,10 @@ from ..cases.description.model import describe
 from ..cases.parsing import suggest_nearest
 from .fragility import bracket_capacities, fragility_curve, read_limit
 from .measures import Demand, Intensity, compute_fractiles, read_demand, read_intensity
+from .openquake import name_measure, write_fragility_model
 from .processes import execute_runs, refuse_mpirun
 from .runs import ROW, OneRun, Row, Shaking, gather_shakings, read_json, read_row
+from .selection import Selected
 
 Units = dict[str, tuple[str, str]]
 SECONDS = 30.0  # between two lines about the time left
@@ -52,6 +54,7 @@ STRETCHED = 4.0  # a record that is multiplied by more is no longer like a quake
 STUDY = "ida.json"
 RUNS = "runs"
 FRAGILITY = "fragility.csv"
+MODEL = "fragility.xml"
 
 # Columns of ida.csv before and after the intensity and the demands: column -> (unit, meaning).
 _FIRST_COLUMNS: Units = {
@@ -80,7 +83,8 @@ class IDA:
     Args:
         case: shaken by GroundMotions alone, whose record files are replaced.
         motions: a file, or one file per GroundMotion of the case, for each record; its name is that
-            of its first file.
+            of its first file. Or what ``record_set`` returns of a selection, whose factors
+            multiply scales.
         demands: "COLUMN" or "COLUMN:max", ":min", ":absmax", ":last" of history.csv.
         scales: factors on the motion as the case prepares it.
         levels: in place of scales, values of the intensity, in its unit.
@@ -94,7 +98,7 @@ class IDA:
     """
 
     case: Case
-    motions: Sequence[str | Path | Sequence[str | Path]]
+    motions: Sequence[str | Path | Sequence[str | Path] | Selected]
     demands: Sequence[str]
     scales: Sequence[float] = ()
     levels: Sequence[float] = ()
@@ -353,7 +357,7 @@ def _refuse_files_of_others(out: Path) -> None:
             f"'{out / STUDY}' is damaged, or of no study: restore it, choose another folder, "
             "or move this one away"
         )
-    for name in (TABLE, COLUMNS, FIGURE, FRAGILITY):
+    for name in (TABLE, COLUMNS, FIGURE, FRAGILITY, MODEL):
         if os.path.lexists(out / name):
             raise InputError(
                 f"'{out / name}' is not of a study of vi_contact, which would replace it "
@@ -363,8 +367,12 @@ def _refuse_files_of_others(out: Path) -> None:
 
 
 def _digest_files(shaking: Shaking) -> list[str]:
-    """Return the checksums of the files of a record; a file that is missing is told by its runs."""
-    return [_digest(path.read_bytes()) for path in shaking.files if path.is_file()]
+    """Return the checksums of the files of a record, and its factor if it has one.
+
+    A file that is missing is told by its runs.
+    """
+    digests = [_digest(path.read_bytes()) for path in shaking.files if path.is_file()]
+    return digests if shaking.factor == 1.0 else [*digests, repr(shaking.factor)]
 
 
 def _digest(data: bytes) -> str:
@@ -468,6 +476,7 @@ def _write_fragilities(
     """
     measure = study.measure
     curves = {}
+    fits = {}
     table = []
     for text in study.limits:
         try:
@@ -475,6 +484,7 @@ def _write_fragilities(
         except InputError as error:
             say(f"fragility of {text}: {error}")
             continue
+        fits[text] = fit
         curves[text] = (fit.probability, fit.brackets)
         table.append(
             [text, fit.theta, *fit.intervals[0], fit.beta, *fit.intervals[1], len(fit.brackets)]
@@ -494,6 +504,9 @@ def _write_fragilities(
         "records",
     ]
     write_csv(out / FRAGILITY, names, table)
+    if fits and name_measure(measure.name) is not None:
+        taxonomy = study.case.path.stem
+        write_fragility_model(out / MODEL, fits, measure.name, taxonomy=taxonomy)
     if curves:
         plot_fragility(
             curves,

@@ -19,6 +19,7 @@ from ...ground_motion.record import Record
 from ..cases.case import Case, read_case
 from ..cases.stage_tables import refuse_own
 from ..cases.toml_file import format_value
+from .selection import Selected, read_selection
 
 Row = dict[str, Any]  # of ida.csv, by column
 ROW = "row.json"  # in the folder of a run that has ended
@@ -32,27 +33,29 @@ class Shaking:
     Attributes:
         name: of the record, as "h" of (h.at2, v.at2).
         files: one for each ground motion of the case.
+        factor: of its own, on all of them, as a selection gives it.
     """
 
     name: str
     files: tuple[Path, ...]
+    factor: float = 1.0
 
     def settings(self, case: Case, factor: float = 1.0) -> tuple[str, ...]:
         """Return KEY=VALUE that put these records into the case.
 
-        Its own scales are multiplied by the factor.
+        Its own scales are multiplied by the factor, and by that of the record.
         """
         settings = []
         for (place, table), path in zip(gather_ground_motions(case), self.files, strict=True):
             record = table.get("record")
             has_keys = isinstance(record, dict) and "path" in record
             key = f"{place}.record.path" if has_keys else f"{place}.record"
-            scale = float(table.get("scale", 1.0)) * factor
+            scale = float(table.get("scale", 1.0)) * factor * self.factor
             settings += [f"{key}={format_value(str(path))}", f"{place}.scale={scale!r}"]
         return tuple(settings)
 
     def record(self, case: Case) -> Record:
-        """Return the first motion as the case prepares it, at a factor of 1.
+        """Return the first motion as the case prepares it, with the record's own factor.
 
         Raises:
             InputError: when a file is wrong.
@@ -94,18 +97,21 @@ def gather_ground_motions(case: Case) -> list[tuple[str, Mapping[str, Any]]]:
 
 
 @check_arguments
-def record_set(word: str) -> list[list[str]]:
+def record_set(word: str) -> list[list[str] | Selected]:
     """Return the files of each record of a text.
 
     Args:
         word: "H", "H,V", a folder (its AT2 files, if it has any, else all) or "@LIST". A LIST is a
-            file with "H" or "H,V" in each line, relative to its folder.
+            file with "H" or "H,V" in each line, relative to its folder. One whose name ends in
+            ".csv" is a selection with a header (``read_selection``), and has factors too.
 
     Raises:
         InputError: for other texts, and a folder or LIST that cannot be read.
     """
     folder = Path()
     path = Path(word.removeprefix("@"))
+    if word.startswith("@") and path.suffix.lower() == ".csv":
+        return [*read_selection(path)]
     try:
         if word.startswith("@"):
             folder = path.parent
@@ -152,16 +158,23 @@ def _join_folder(folder: Path, names: list[str]) -> list[str]:
 
 
 def gather_shakings(
-    case: Case, motions: Sequence[str | Path | Sequence[str | Path]]
+    case: Case, motions: Sequence[str | Path | Sequence[str | Path] | Selected]
 ) -> list[Shaking]:
     """Return the records by name.
 
-    A motion is a file, or one file for each ground motion of the case.
+    A motion is a file, or one file for each ground motion of the case; of a selected record the
+    first ones are taken.
     """
     count = len(gather_ground_motions(case))
     by_name: dict[str, Shaking] = {}
     for motion in motions:
-        paths = [motion] if isinstance(motion, str | Path) else motion
+        factor = 1.0
+        paths: Sequence[str | Path]
+        if isinstance(motion, Selected):
+            paths = motion.files[:count]
+            factor = motion.factor
+        else:
+            paths = [motion] if isinstance(motion, str | Path) else motion
         files = tuple(Path(path).resolve() for path in paths)
         if len(files) != count:
             names = ", ".join(file.name for file in files)
@@ -175,7 +188,7 @@ def gather_shakings(
                 f"two motions are called '{name}': rename a file, as their runs need different "
                 "names"
             )
-        by_name[name] = Shaking(name, files)
+        by_name[name] = Shaking(name, files, factor)
     if not by_name:
         raise InputError("motions is empty: give at least one record file")
     return list(by_name.values())
@@ -231,7 +244,7 @@ class OneRun:
         row = {
             "record": self.shaking.name,
             "files": [str(path) for path in self.shaking.files],
-            "scale": self.factor,
+            "scale": self.factor * self.shaking.factor,
             "status": "finished" if finished else "failed",
             "reason": "" if finished else _find_reason(printed, code),
             "certificate": facts.get("worst_certificate"),
