@@ -422,7 +422,9 @@ def test_wrong_uses_are_refused() -> None:
     with pytest.raises(InputError, match="matched by matching=NodeToNode"):
         fem.contact_pair(system, one, two, matching=fem.DualMortar())
     wall = fem.contact_surface(system, tags["lower_right"])
-    with pytest.raises(InputError, match="nodes of P2 tetrahedra have one contact condition for each unknown"):
+    with pytest.raises(
+        InputError, match="nodes of P2 tetrahedra have one contact condition for each unknown"
+    ):
         fem.joined_surfaces(fem.contact_pair(system, one, two), wall)
     joined = fem.joined_surfaces(
         fem.contact_pair(system, one, two), fem.contact_surface(system, tags["lower_bottom"])

@@ -687,6 +687,14 @@ def test_case_files_know_the_public_names() -> None:
     }
     # no words
     others = {
+        "DruckerPrager",
+        "Iwan",
+        "J2",
+        "MohrCoulomb",
+        "NeoHookean",
+        "Prestress",
+        "SaintVenantKirchhoff",
+        "YieldingMaterial",
         "ExponentialDecay",
         "StaticKinetic",
         "RateIteration",

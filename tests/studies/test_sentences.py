@@ -68,7 +68,7 @@ OTHERS = (
     "give KEY=VALUE, such as friction.mu=0.5",
     "node (0, 0) is on side 1",
 )
-# Friction at a corner that has two directions: found when the problem is made.
+# A mesh that is too coarse for the mass of the default scheme: found when the run begins.
 CORNER = """
 [mesh]
 type = "BlockMesh"
@@ -112,7 +112,7 @@ def test_a_run_and_its_check_say_what_to_write(
     case.write_text(CORNER)
     assert main(["run", str(case), "--out", str(tmp_path / "out"), *words]) == 1
     said = capsys.readouterr().err
-    assert "frictionless_corners = true in every [[contact]]" in said
+    assert '[mass] type = "ConsistentMass"' in said
     assert "()" not in said
 
 

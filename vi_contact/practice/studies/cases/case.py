@@ -525,7 +525,8 @@ class Case:
         if "gravity" in self.nodes:
             system = self._build_table("gravity", system=system, tags=tags)
         no_surface = empty_surface(system.algebra.comm, system.space.dimension)
-        surfaces = self._build_tables("contact", system=system, tags=tags) or (no_surface,)
+        contacts = self._build_tables("contact", system=system, tags=tags)
+        surfaces = contacts or (no_surface,)
         surface = joined_surfaces(*surfaces) if len(surfaces) > 1 else surfaces[0]
 
         # Motions that rise through the base are no inertia load as well.
@@ -533,9 +534,7 @@ class Case:
         rising = any(
             node.callee.name == "upgoing" and "motion" not in node.arguments for node in calls
         )
-        tables = () if "contact" not in self.nodes else [
-            len(getattr(one, "parts", ())) for one in surfaces
-        ]
+        tables = tuple(len(getattr(one, "parts", ())) for one in contacts)
         return Parts(system, surface, tags, "gravity" in self.nodes, moved=rising, tables=tables)
 
     def meshed(self, comm: Any) -> tuple[Any, Tags]:
