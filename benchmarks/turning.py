@@ -83,7 +83,7 @@ def measure(problem: vc.ContactProblem, dt: float, steps: int) -> tuple[Numbers,
     numbers = {
         "unknowns": problem.system.space.unknowns,
         "linear_steps_mean": float(np.mean([report.result.iterations for report in reports])),
-        "tangents_per_step": stepper.passes[dt].tangents / steps,
+        "tangents_per_step": stepper.prepared[dt].tangents / steps,
         "certificate": max(report.certificate.worst for report in reports),
         "seconds": seconds,
         "ratio": seconds / plain,

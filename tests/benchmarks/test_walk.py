@@ -23,10 +23,11 @@ def test_a_file_that_is_left_and_seen_again_is_a_return():
 
 
 def test_the_mesh_goes_forward_through_assemble():
-    """It visited 77 times in 15 files when unknowns asked for nodes, and checks for groups."""
+    """It visited 77 times in 15 files when unknowns asked for nodes, and checks for groups. Two
+    visits are the question which kind of body it is: linear, one that yields, or one that turns."""
     calls = walk.calls_of_example(ROOT)
     numbers = walk.counts([call for call, handed in calls if handed])
-    assert numbers["files"] >= 12 and numbers["visits"] <= 25
+    assert numbers["files"] >= 12 and numbers["visits"] <= 27
 
 
 def test_the_unknown_returns_to_few_files_in_a_step(tmp_path: Path):

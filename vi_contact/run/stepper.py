@@ -22,6 +22,7 @@ from ..core.algebra import freeze
 from ..core.checks import instance, number
 from ..core.collective import agree, call_user, together, together_if_own
 from ..core.errors import InputError
+from ..core.internal import remembers
 from ..core.joints import pose_joint
 from ..core.problem import ContactProblem
 from ..core.protocols import Impact
@@ -136,6 +137,7 @@ class Stepper:
         self.dt = float("nan")
         self.prepared = {}
         self.joints = {}
+        self._has_memory = remembers(method.problem.system.internal)
 
     def attempt(self, dt: float) -> Trial:
         """Make a step from the state, which stays where it is. Collective.
@@ -182,9 +184,14 @@ class Stepper:
             return self.state
         method = self.method
         with together(method.problem.surface.comm):  # it may ask for loads, which are the user's
-            problem = method.problem.standing_at(self.state)
+            problem = self._stand_at(self.state)
             state = method.scheme.start(problem, self.state, dt)
-        return keep_material(problem.equations, self.state, state)
+        return keep_material(problem.equations, self.state, state) if self._has_memory else state
+
+    def _stand_at(self, state: State) -> ContactProblem:
+        """Return the problem, whose materials go on from a state where they remember."""
+        problem = self.method.problem
+        return problem.standing_at(state) if self._has_memory else problem
 
     def _attempt(self, dt: float) -> Report:
         """Return a step of dt [s].
@@ -200,7 +207,7 @@ class Stepper:
         scheme: Any = self.method.scheme
         surface = self.method.problem.surface
         state = self._convert_state(dt)
-        problem = self.method.problem.standing_at(state)
+        problem = self._stand_at(state)
 
         # The scheme says where the balance holds: one inequality A d = b with contact.
         with together_if_own(surface.comm, scheme):
@@ -232,10 +239,12 @@ class Stepper:
             new = after_impact(problem, scheme, state, free, dt)
         if step.joint is not None:
             new = joint_steps.commit(new, step, certified.result)
-        new = remember_material(problem.equations, new)
-        certificate = certify_material(
-            problem.equations, certified.certificate, new, self.method.tolerance
-        )
+        certificate = certified.certificate
+        if self._has_memory:
+            new = remember_material(problem.equations, new)
+            certificate = certify_material(
+                problem.equations, certificate, new, self.method.tolerance
+            )
         for vector in (free.u, free.v, new.u, new.v):
             freeze(vector)  # states are handed out, and the next step is made of them
         return Report(

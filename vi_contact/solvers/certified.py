@@ -110,9 +110,11 @@ class CertifiedSolver:
             # Round-off that comes near the tolerance is corrected; larger residuals have causes
             # that no correction removes, and no solver is asked for more than it aims at.
             goal = NEAR * self._tolerance
-            if max(goal, result.aim) < answer.worst < FAR:
+            worst = answer.worst
+            if max(goal, result.aim) < worst < FAR:
                 answer = correct(step, answer, self._get(place).solve, goal)
-            if answer.worst <= self._tolerance:
+                worst = answer.worst
+            if worst <= self._tolerance:
                 return answer
             failures.append(f"{result.method}: {answer.certificate}")
         raise StepFailure(

@@ -199,7 +199,12 @@ def assemble(
     check_nodes(comm, nodes, degree)
     if nodes.curved:
         refuse_folded(mesh)
-    supports = _find_supports(mesh, V, conditions)
+    # what conditions hold of the owned blocks of the displacement's space
+    places = [compat.locate_owned_blocks(V, held.facets.indices) for held in conditions.held]
+    supports = [
+        held.support(on_facets, mesh.geometry.dim)
+        for held, on_facets in zip(conditions.held, places, strict=True)
+    ]
     if bcs:
         supports += [values.support(nodes.owned) for values in read_values(mesh, V, bcs)]
     space = FemSpace(
@@ -213,18 +218,10 @@ def assemble(
     materials = [] if material is None else cell_materials(mesh, material)
     if any(isinstance(given, YieldingMaterial) for _, given in materials):
         refuse_in_yielding(forms, conditions.loads)
-    if forms is None:
-        body = _state_body(
-            space,
-            materials,
-            section,
-            damping,
-            conditions,
-            integration=integration,
-            stress=initial_stress,
-        )
-    else:
-        body = OwnForms(space, forms, materials, section, damping)
+    make_body = _choose_forms(
+        forms, materials, conditions, integration=integration, stress=initial_stress
+    )
+    body = make_body(space, materials=materials, section=section, damping=damping)
     body.boundaries = conditions.dashpots
     check_ratios(
         damping,
@@ -285,50 +282,31 @@ def assemble(
     return system
 
 
-def _find_supports(mesh: Any, V: Any, conditions: Conditions) -> list[Any]:
-    """Return what conditions hold of the owned blocks of the displacement's space. Collective.
-
-    Args:
-        mesh: of the body.
-        V: the space.
-        conditions: what holds the body.
-    """
-    places = [compat.locate_owned_blocks(V, held.facets.indices) for held in conditions.held]
-    supports = []
-    for held, on_facets in zip(conditions.held, places, strict=True):
-        supports.append(held.support(on_facets, mesh.geometry.dim))
-    return supports
-
-
-def _state_body(
-    space: FemSpace,
+def _choose_forms(
+    forms: Forms | None,
     materials: list[tuple[Any, Any]],
-    section: Section,
-    damping: Damping,
     conditions: Conditions,
     *,
     integration: str,
     stress: Callable[[Array], Array] | None,
-) -> ElasticForms:
-    """Return the forms of a body of materials, which yields, turns, or does neither. Collective.
+) -> Callable[..., ElasticForms]:
+    """Return what makes the forms of a body: the user's own, or those of its materials.
 
     Args:
-        space: its unknowns.
+        forms: the user's own, or None.
         materials: pairs of local cells and a material.
-        section: that of the body.
-        damping: the law of C.
         conditions: what holds, damps and loads it.
         integration: "full", "selective" or "bbar".
         stress: that of a yielding body at the start, or None.
     """
-    if any(isinstance(given, TURNING) for _, given in materials):
-        return TurningForms(space, materials, section, damping, conditions)
-    if any(isinstance(given, YieldingMaterial) for _, given in materials):
-        return YieldingForms(
-            space, materials, section, damping, integration=integration, initial_stress=stress
-        )
-    selective = integration == "selective"
-    return ElasticForms(space, materials, section, damping, selective=selective)
+    if forms is not None:
+        return partial(OwnForms, given=forms)
+    given = [material for _, material in materials]
+    if any(isinstance(material, TURNING) for material in given):
+        return partial(TurningForms, conditions=conditions)
+    if any(isinstance(material, YieldingMaterial) for material in given):
+        return partial(YieldingForms, integration=integration, initial_stress=stress)
+    return partial(ElasticForms, selective=integration == "selective")
 
 
 def _gather_companions(
