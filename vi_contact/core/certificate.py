@@ -1,7 +1,6 @@
 """Judge one step: how far an answer is from solving it; ``core.verify`` computes that."""
 
 from dataclasses import dataclass, fields
-from functools import cached_property
 
 from .html import make_table
 
@@ -53,10 +52,10 @@ class Certificate:
     law: float = 0.0
     material: float = 0.0
 
-    @cached_property
+    @property
     def worst(self) -> float:
         """Return the largest residual; NaN counts as infinite."""
-        values = vars(self).values()  # of the fields: this one is not there yet
+        values = vars(self).values()
         return max(values) if sum(values) >= 0.0 else float("inf")
 
     def list_rows(self) -> list[tuple[str, str]]:

@@ -245,8 +245,10 @@ class Stepper:
             certificate = certify_material(
                 problem.equations, certificate, new, self.method.tolerance
             )
-        for vector in (free.u, free.v, new.u, new.v):
-            freeze(vector)  # states are handed out, and the next step is made of them
+        # States are handed out, and the next step is made of them.
+        freeze(free.v)
+        freeze(new.u)
+        freeze(new.v)
         return Report(
             problem=problem,
             old=state,
