@@ -73,11 +73,14 @@ class ContactProblem:
 
     def __repr__(self) -> str:
         """Return unknowns, conditions and laws of all ranks in a few lines, not the arrays."""
+        law = f"friction: {quote(self.friction)}"
+        if self.joint is not None:
+            law = f"joint: {quote(self.joint)}"
         lines = [
             f"ContactProblem with {self.surface.total} contact conditions",
             str(self.system),
             str(self.surface),
-            f"friction: {quote(self.friction)}",
+            law,
             f"impact: {quote(self.impact)}",
             f"mass: {quote(self.mass or 'that of the time scheme')}",
         ]

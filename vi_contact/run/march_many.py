@@ -12,6 +12,7 @@ from ..core.problem import ContactProblem
 from ..core.state_checks import initial_state
 from ..core.step import Report, Scheme, Solver, State
 from ..solvers.certified import TOLERANCE
+from .materials import start_scheme
 from .method import choose_method, with_defaults
 from .time_steps import TimeSteps, plan_steps
 from .together import Together, group_runs
@@ -78,7 +79,8 @@ def march_many(
         if state is None:
             state = initial_state(method.problem)
         plan = plan_steps(dt, count, end, state.t)
-        runs.append(Together(method, plan, scheme.start(method.problem, state, plan.dt(0))))
+        first = start_scheme(method.problem, scheme, state, plan.dt(0))
+        runs.append(Together(method, plan, first))
     group_runs(runs)
     return _march_in_turn(runs)
 

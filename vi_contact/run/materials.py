@@ -9,8 +9,24 @@ from typing import Any
 from ..core.certificate import Certificate
 from ..core.errors import StepFailure
 from ..core.internal import remembers, select_memory
-from ..core.step import State
+from ..core.problem import ContactProblem
+from ..core.step import Scheme, State
 from ..core.system import SemiDiscreteSystem
+
+
+def start_scheme(problem: ContactProblem, scheme: Scheme, state: State, dt: float) -> State:
+    """Return a state with the memory that a scheme needs, and what materials remember. Collective.
+
+    Args:
+        problem: that is marched.
+        scheme: its time scheme, which may replace the memory of the state.
+        state: the first one of steps of another length.
+        dt: length of the steps [s].
+    """
+    if not remembers(problem.system.internal):
+        return scheme.start(problem, state, dt)
+    standing = problem.standing_at(state)
+    return keep_material(standing.equations, state, scheme.start(standing, state, dt))
 
 
 def keep_material(system: SemiDiscreteSystem, old: State, new: State) -> State:

@@ -37,6 +37,7 @@ from .files.folder import HISTORY_H5, lock_folder, run_folder
 from .files.stored_rows import StoredRows
 from .files.table import Block, Table
 from .files.writer import FieldWriter, Writer
+from .materials import start_scheme
 from .method import Method, choose_method, with_defaults
 from .recorders import Contact, Energy, JointEnergy
 from .recorders.steps import Steps
@@ -198,7 +199,8 @@ def open_run(
         place, checksum = _find_start(request, method, source)
         plan = plan_steps(request.dt, request.steps, request.t_end, place.t_start)
         with together(comm):
-            first = method.scheme.start(method.problem, place.state, plan.dt(place.base))
+            dt = plan.dt(place.base)
+            first = start_scheme(method.problem, method.scheme, place.state, dt)
         place = replace(place, state=first)
 
         # The recorders name their columns, which the table needs to read rows of an earlier run;

@@ -121,6 +121,7 @@ class _Turn:
         self.session.last = None
         self.session.loop = None
         self.loop.prepared.clear()
+        self.loop.joints.clear()
 
 
 def _simulate_in_turn(

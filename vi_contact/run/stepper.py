@@ -34,7 +34,7 @@ from ..solvers.door import refuse_nan
 from ..solvers.joints import JointSolver
 from ..solvers.nonlinear import NonlinearSolver
 from . import joint_steps
-from .materials import certify_material, keep_material, remember_material
+from .materials import certify_material, remember_material, start_scheme
 from .method import Method, choose_method
 
 FACTORS = 12  # lengths of steps whose factors are kept by a Stepper
@@ -184,9 +184,7 @@ class Stepper:
             return self.state
         method = self.method
         with together(method.problem.surface.comm):  # it may ask for loads, which are the user's
-            problem = self._stand_at(self.state)
-            state = method.scheme.start(problem, self.state, dt)
-        return keep_material(problem.equations, self.state, state) if self._has_memory else state
+            return start_scheme(method.problem, method.scheme, self.state, dt)
 
     def _stand_at(self, state: State) -> ContactProblem:
         """Return the problem, whose materials go on from a state where they remember."""

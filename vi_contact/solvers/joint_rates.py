@@ -58,9 +58,7 @@ class RatePasses:
         change = np.inf
         for count in range(1, PASSES + 1):
             step = _apply(base, joint, speed)
-            normal = surface.normal_values(step.b - base.b)[:, None]
-            tangential = surface.tangential_values(step.b - base.b)
-            push = np.asarray(surface.everywhere(np.hstack([normal, tangential]))).ravel()
+            push = find_push(step, small.width)
             end = small.make(step, push)
             before = step.joint.used.mu
             speed = self._find_rates(joint, end, speed, step.scale)
@@ -145,6 +143,26 @@ class RatePasses:
         self._response = loads.T @ np.linalg.solve(H[np.ix_(chosen, chosen)], loads)
         self._key = key
         return self._response
+
+
+def find_push(step: StepProblem, width: int) -> Array:
+    """Return the forces (M width,) of the joint at all conditions, on every rank. Collective.
+
+    They are those by which a step differs from its base, ``scale`` times newtons.
+
+    Args:
+        step: the step for r'.
+        width: contact unknowns of a condition.
+    """
+    surface = step.surface
+    joint = step.joint
+    normal, shear = joint.prestress
+    rows = (normal + joint.pull)[:, None]
+    if width > 1:
+        traces = surface.traces
+        moves = surface.tangents >= 0 if traces is None else traces.moves
+        rows = np.hstack([rows, np.where(moves, shear, 0.0)])
+    return np.asarray(surface.everywhere(step.scale * rows)).ravel()
 
 
 def _apply(base: StepProblem, joint: JointStep, speed: Array) -> StepProblem:

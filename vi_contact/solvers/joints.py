@@ -30,7 +30,7 @@ from .acceleration import Anderson
 from .certified import Certified
 from .condensed_passes import CondensedPasses, PassEnd
 from .joint_newton import correct
-from .joint_rates import RatePasses
+from .joint_rates import RatePasses, find_push
 
 log = logging.getLogger(__name__)
 
@@ -137,7 +137,7 @@ class JointSolver:
         end: PassEnd | None = None
         for count in range(1, MOST + 1):
             step = joint.apply(base, used)
-            push = _find_push(step, base, small.width)
+            push = find_push(step, small.width)
             try:
                 end = small.make(step, push, end)
             except StepFailure:  # whole steps have methods to escalate to
@@ -162,7 +162,8 @@ class JointSolver:
                 continue
             g2, s2 = correction
             used = joint.ask(g1 + part * (g2 - g1), s1 + part * (s2 - s1))
-        raise self._refuse(base, lag)
+        # Passes by whole steps take another way, and ask methods that were named to escalate to.
+        return self._solve_whole(base, joint, joint.guess(base))
 
     def _finish(
         self, step: StepProblem, small: CondensedPasses, push: Array, end: PassEnd, count: int
@@ -244,21 +245,6 @@ def _with_law(step: StepProblem, certified: Certified) -> Certified:
     law = judge_strength(step, certified.result)
     certificate = replace(certified.certificate, law=law)
     return replace(certified, certificate=certificate)
-
-
-def _find_push(step: StepProblem, base: StepProblem, width: int) -> Array:
-    """Return by which forces (M width,) a step differs from its base, on every rank. Collective.
-
-    Args:
-        step: the step for r'.
-        base: without the joint.
-        width: contact unknowns of a condition.
-    """
-    surface = step.surface
-    change = step.b - base.b
-    normal = surface.normal_values(change)[:, None]
-    rows = normal if width == 1 else np.hstack([normal, surface.tangential_values(change)])
-    return np.asarray(surface.everywhere(rows)).ravel()
 
 
 def _extrapolate(acceleration: Anderson, used: Strength, there: Strength) -> Strength:

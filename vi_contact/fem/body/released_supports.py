@@ -21,6 +21,7 @@ from ...core.algebra import Array, Mask, from_each, largest, max_abs
 from ...core.checks import several
 from ...core.errors import InputError
 from ...core.internal import remembers
+from ...core.joints import MEMORY
 from ...core.problem import ContactProblem
 from ...core.state_checks import check_problem_given, check_sizes
 from ...core.step import State
@@ -143,7 +144,9 @@ def begin_from(
         return 2.0 * x - surface.coupling @ x
 
     r_t = state.r_t if problem.frictional else None
-    first = State(0.0, 0, turn(u0), turn(v0), state.r_n, state.active, r_t=r_t)
+    # What a joint has gone through is its own, whatever supports there are.
+    memory = {name: x for name, x in state.memory.items() if name.startswith(MEMORY)}
+    first = State(0.0, 0, turn(u0), turn(v0), state.r_n, state.active, memory, r_t)
     load = replace(load, constant=load.constant + force)
     return replace(problem, system=system.changed(u0=u0, v0=v0, load=load)), first
 

@@ -297,6 +297,11 @@ class Tally:
             self._take_largest("defect", np.abs(rows["energy_defect"]))
             # what yielding takes hides nothing that the scheme creates
             losses = sum(rows[name] for name in LOSSES if name in rows)
+            if "energy_joint" in rows:
+                # those of a joint hold the works of water and prestress, and what it gives back
+                stored = self._sums.setdefault("joint at the start", rows["energy_joint"][0])
+                losses = losses + rows["work_joint_water"] + rows["work_prestress"]
+                losses = losses - (rows["energy_joint"] - stored)
             self._take_largest("created", -np.asarray(losses))
 
     def _add_to_sum(self, name: str, values: Array) -> None:

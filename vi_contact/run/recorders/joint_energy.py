@@ -6,6 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from ...core.algebra import total
+from ...core.errors import InputError
 from ...core.joints import pose_joint
 from ...core.problem import ContactProblem
 from ...core.step import Columns, Report, Row, State
@@ -55,6 +56,11 @@ class JointEnergy:
             state: the first state.
             resumed: the last row of the run that is continued, None for a new run.
         """
+        if problem.joint is None:
+            raise InputError(
+                "JointEnergy: the problem has no joint: leave the recorder out, or give the "
+                "problem joint="
+            )
         self._problem = problem
         self._stored = self._compute_stored(state)
         self._sums = dict.fromkeys(self._SUMS, 0.0)
