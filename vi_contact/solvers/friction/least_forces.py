@@ -25,6 +25,8 @@ from .rings import DEPENDENT, Ring, find_null_space
 
 CUTS = 60  # half planes of one disk, at most; each brings the answer nearer by its square
 TINY = 1e-300  # in the place of the size of traces that are all zero
+ROUNDING = 1e-14  # of gradients of unit columns
+CHANGES = 10  # of the active set, for each column, at most
 CLOSE = 1e-13  # of the largest force: how far outside a disk counts as on it
 
 
@@ -160,17 +162,62 @@ def _find_least(a: Array, b: Array, y0: Array) -> Array:
     used = size > 0.0
     a = a[used] / size[used, None]
     h = np.minimum(b[used] / size[used], 0.0) + a @ y0
-    unit = max_abs(h)
-    if not (h > 0.0).any():
+    unit = float(h.max(initial=0.0))  # what is missing; far limits may be as large as they like
+    if unit == 0.0:
         return -y0  # the least of all is allowed
-    from scipy.optimize import nnls  # late: it takes a while
-
     E = np.vstack([a.T, h[None] / unit])
     f = np.zeros(len(E))
     f[-1] = 1.0
-    multipliers, _ = nnls(E, f)
-    on_edge = multipliers > 0.0
+    on_edge = _find_multipliers(E, f) > 0.0
     # The same once more with the edges that hold, to all digits.
     edges = a[on_edge]
     t = np.linalg.lstsq(edges, h[on_edge], rcond=DEPENDENT)[0]
     return np.asarray(t - y0)
+
+
+def _find_multipliers(E: Array, f: Array) -> Array:
+    """Return x >= 0 with the least |E x - f|, by the active set of Lawson and Hanson.
+
+    Half planes that are nearly parallel need every digit, which a library that stops at a tolerance
+    of its own does not give in all its versions.
+
+    Args:
+        E: (k, n) columns.
+        f: (k,) right side.
+    """
+    n = E.shape[1]
+    x = np.zeros(n)
+    is_free = np.zeros(n, dtype=bool)
+    scale = np.linalg.norm(E, axis=0)
+    for _ in range(CHANGES * n):
+        # The column that helps most becomes free; one that would turn negative at once does not.
+        gradient = E.T @ (f - E @ x) / scale
+        gradient[is_free] = 0.0
+        while True:
+            enters = int(np.argmax(gradient))
+            if not gradient[enters] > ROUNDING:
+                return x
+            is_free[enters] = True
+            wanted = _solve_free(E, f, is_free)
+            if wanted[enters] > 0.0:
+                break
+            is_free[enters] = False
+            gradient[enters] = 0.0
+
+        # Those that would turn negative are left at zero, one after another.
+        while (wanted[is_free] <= 0.0).any():
+            falls = is_free & (wanted <= 0.0)
+            ratio = np.where(falls, x / np.where(falls, x - wanted, 1.0), np.inf)
+            x = x + ratio.min() * (wanted - x)
+            is_free &= ~(falls & (ratio <= ratio.min()))
+            x[~is_free] = 0.0
+            wanted = _solve_free(E, f, is_free)
+        x = wanted
+    return x
+
+
+def _solve_free(E: Array, f: Array, is_free: Mask) -> Array:
+    """Return the x of least squares of some columns, zero elsewhere."""
+    x = np.zeros(E.shape[1])
+    x[is_free] = np.linalg.lstsq(E[:, is_free], f, rcond=None)[0]
+    return x
