@@ -4,6 +4,7 @@ forces."""
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,13 +14,14 @@ from mpi4py import MPI
 from soil import SOIL, strip
 
 import vi_contact as vc
-from vi_contact import fem, soil
+from vi_contact import fem, laws, soil
 from vi_contact.core.errors import InputError
 from vi_contact.core.surfaces import empty_surface
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
 
 DT = 4e-3
+FLOOR = vc.HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
 WEIGHT = fem.BodyForce((0.0, -2000.0 * 9.81))
 
 
@@ -118,6 +120,34 @@ def test_what_does_not_fit_is_refused(comm):
         InputError, match="a support or tie of the problem is .* m away from where the static stage"
     ):
         fem.release(static, state, problem)
+
+
+@pytest.mark.serial
+def test_the_prestress_of_a_joint_is_no_missing_force(comm):
+    """Soil that was prestressed before anything moves goes on so, at rest, and its joint too."""
+    static, _, dynamic, _ = stages(comm)
+    before = laws.Prestress(normal=1e6, shear=3e5)
+    fault = laws.SlipWeakening(static=0.6, kinetic=0.5, distance=1e-3, prestress=before)
+    static, dynamic = (replace(problem, joint=fault) for problem in (static, dynamic))
+    state = vc.static_equilibrium(static, solver=vc.Condensed())
+    problem, start = fem.release(static, state, dynamic)
+    r_n = static.surface.weights * 1e6
+    assert np.all(start.r_n > 0.9 * r_n)
+    ((new, _),) = deque(vc.march(problem, dt=DT, steps=50, state=start), maxlen=1)
+    assert np.abs(new.u - start.u).max() < 1e-11 * np.abs(start.u).max()
+    assert np.abs(new.r_n - start.r_n).max() < 1e-10 * start.r_n.max()
+    assert np.abs(new.r_t - start.r_t).max() < 1e-10 * start.r_n.max()
+
+    # A body that nothing else loads: all forces but the reactions are rounding.
+    mesh, tags = strip(comm, 6.0, 4.0, (6, 4))
+    bodies = [fem.assemble(mesh, SOIL, clamped=tags["left"]) for _ in range(2)]
+    surfaces = [fem.contact_surface(body, tags["bottom"], obstacle=FLOOR) for body in bodies]
+    first, second = (
+        vc.ContactProblem(body, surface, joint=fault)
+        for body, surface in zip(bodies, surfaces, strict=True)
+    )
+    _, start = fem.release(first, vc.static_equilibrium(first), second)
+    assert np.abs(start.r_n - second.surface.weights * 1e6).max() < 1e-9 * start.r_n.max()
 
 
 HOUSE = vc.LinearElastic(E=2e8, nu=0.2, rho=1500.0)

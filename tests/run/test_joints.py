@@ -368,3 +368,33 @@ def test_what_a_joint_does_not_go_with_is_refused() -> None:
     law = laws.SlipWeakening(static=0.6, kinetic=0.5, distance=1e-3, prestress=before)
     with pytest.raises(InputError, match="is beyond the strength there"):
         replace(rock, joint=law)
+
+
+def test_states_of_other_joint_laws_are_refused(tmp_path: Path) -> None:
+    """By march, quasi_static and a changed restart alike; a state without a joint is unbroken."""
+    whole = torn_mass(opening=1e-3)
+    *_, (state, _) = march(whole, 1e-3, 5e-3)
+    slips = laws.SlipWeakening(static=0.6, kinetic=0.3, distance=1e-3)
+    weak = replace(whole, joint=slips)
+    said = r"the state is of another joint law .*kappa.*SlipWeakening needs way.*: give a state"
+    with pytest.raises(InputError, match=said):
+        march(weak, 1e-3, 1e-2, state=state)
+    with pytest.raises(InputError, match=said):
+        list(vc.quasi_static(weak, [1e-2], state=state))
+    settings: dict[str, Any] = {"scheme": HALF, "solver": vc.Condensed(), "progress": False}
+    vc.simulate(whole, dt=1e-3, steps=5, out=tmp_path, **settings)
+    with pytest.raises(InputError, match=said):
+        vc.simulate(weak, dt=1e-3, steps=8, restart=tmp_path, changed=True, **settings)
+    one = {"joint_way": state.memory["joint_way"]}
+    for memory in (one, {**state.memory, "joint_way": np.zeros(2)}):
+        with pytest.raises(InputError, match="another joint law"):
+            march(whole, 1e-3, 1e-2, state=replace(state, memory=memory))
+
+    # What has nothing of a joint starts unbroken, and other numbers of the same law go on.
+    scheme = {name: x for name, x in state.memory.items() if not name.startswith("joint_")}
+    straight = march(whole, 1e-3, 0.03, state=state)
+    again = march(whole, 1e-3, 0.03, state=replace(state, memory=scheme))
+    assert difference(straight[-1][0], again[-1][0]) == 0.0
+    assert straight[-1][0].memory["joint_kappa"][0] > 0.0
+    longer = march(torn_mass(opening=2e-3), 1e-3, 0.03, state=state)
+    assert longer[-1][0].memory["joint_kappa"][0] > 0.0

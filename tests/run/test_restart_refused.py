@@ -12,13 +12,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from marched_chain import chain, rubbing_box, run, run_wall, wall
 
 from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem
+from vi_contact.core.protocols import Frictionless
+from vi_contact.fem.contact.points import contact_points
+from vi_contact.fem.matrices.own_matrices import system_from_arrays
 from vi_contact.laws.excitation import Harmonic, Tabulated
 from vi_contact.laws.friction import Coulomb, ExponentialDecay, SlipRateCoulomb
 from vi_contact.laws.impact import Elastic
+from vi_contact.laws.joint import Joint
+from vi_contact.laws.joint_values import Prestress
+from vi_contact.laws.joints_by_part import JointsByPart
 from vi_contact.run.files.checkpoint import compute_checksum
 from vi_contact.run.files.identity import find_differences, identify, write_as_text
 from vi_contact.run.simulate import simulate
@@ -288,10 +295,17 @@ def test_other_ranks_are_the_same_problem(comm: Any) -> None:
         mu = 0.3 + 0.01 * np.arange(box.surface.total)
         return replace(box, friction=SlipRateCoulomb(ExponentialDecay(mu, 0.2, 1.0)))
 
+    def bound(ranks: Any) -> ContactProblem:
+        box = rubbing_box(ranks, None)
+        parts = np.arange(box.surface.total) % 3 // 2
+        both = {"a": Joint(mu=lambda x: 0.3 + x[:, 0] ** 2), "b": Joint(tension=2.0, opening=1e-3)}
+        return replace(box, impact=None, friction=Frictionless(), joint=JointsByPart(both, parts))
+
     for make in (
         wall,
         lambda ranks: replace(rubbing_box(ranks, None), friction=Coulomb(0.3)),
         rough,
+        bound,
     ):
         spread, alone = numbers(make(comm)), numbers(make(MPI.COMM_SELF))
         assert not find_differences(spread, alone) and spread.keys() == alone.keys()
@@ -331,3 +345,45 @@ def test_another_material_is_refused_on_all_ranks(comm: Any, shared_tmp: Path) -
         InputError, match=r"friction law = SlipRateCoulomb.* but this one has Coulomb\(mu=0.3\)"
     ):
         simulate(replace(box, friction=Coulomb(0.3)), restart=True, **settings)
+
+
+POINTS = 1010  # more than numpy writes out
+JOINTS: dict[str, tuple[Any, ...]] = {  # values of mu, of dc [m] and of sigma0 [Pa], and the part
+    "part": (0.6, 1e-3, 1e5, 600),
+    "mu": (0.61, 1e-3, 1e5, 500),
+    "what the strength is lost over": (0.6, 1.01e-3, 1e5, 500),
+    "prestress": (0.6, 1e-3, 1.01e5, 500),
+}
+
+
+def joint_facts(mu: float, opening: float, normal: float, first: int) -> dict[str, Any]:
+    """What identifies a chain of masses with a joint of two laws, whose values are functions."""
+    row = np.arange(float(POINTS))
+    system = system_from_arrays(
+        np.ones(POINTS), None, sp.eye(POINTS, format="csr"), coordinates=row[:, None]
+    )
+    surface = contact_points(system, np.arange(POINTS), [[-1.0]] * POINTS)
+    loses = Joint(
+        tension=lambda x: 2.0 + x[:, 0] / POINTS,
+        cohesion=3.0,
+        opening=lambda x: opening + 0.0 * x[:, 0],
+        prestress=Prestress(normal=lambda x: normal + 0.0 * x[:, 0]),
+    )
+    rubs = Joint(mu=lambda x: mu + 0.0 * x[:, 0])
+    part = np.where(row < first, 0, 1)
+    joint = JointsByPart({"loses": loses, "rubs": rubs}, part)
+    problem = ContactProblem(system, surface, joint=joint)
+    return identify(problem, ZienkiewiczWoodTaylor(), 1e-3, start=0.0, end=1.0)
+
+
+@serial
+@pytest.mark.parametrize("name", JOINTS)
+def test_joints_of_parts_are_told_by_their_values(name: str) -> None:
+    """Functions and long tables, whose text is the same, count by what they give the points."""
+    same = (0.6, 1e-3, 1e5, 500)
+    facts = joint_facts(*same)
+    assert find_differences(facts, joint_facts(*same)) == {}
+    other = joint_facts(*JOINTS[name])
+    assert find_differences(facts, other) == {
+        "strength of the joint": "another strength of the joint"
+    }

@@ -9,6 +9,7 @@ from .algebra import max_abs
 from .checks import instance, number, quote, refuse, whole
 from .errors import InputError
 from .internal import remembers, select_memory
+from .joints import RAISED, read_committed
 from .obstacles import PRESS_FIT
 from .problem import ContactProblem
 from .step import State
@@ -50,9 +51,10 @@ def check_sizes(owner: str, problem: ContactProblem, state: Any) -> None:
 def _find_defects_of_state(problem: ContactProblem, state: State) -> Iterator[str]:
     """Yield a sentence for each wrong array of a state on this rank.
 
-    Its memory is not looked at, which is for its scheme, but for what materials remember.
+    Its memory is for its scheme, and only what materials and joints remember is looked at.
     """
     yield from _find_defects_of_material(problem, state)
+    yield from _find_defects_of_joint(problem, state)
     n = problem.system.rows
     m = problem.surface.count
     d = problem.system.influence.shape[1]
@@ -92,6 +94,29 @@ def _find_defects_of_material(problem: ContactProblem, state: State) -> Iterator
             "the state is deformed and remembers no stress of the body, which yields: give the "
             "state that a static stage or a run of this problem has returned"
         )
+
+
+def _find_defects_of_joint(problem: ContactProblem, state: State) -> Iterator[str]:
+    """Yield a sentence where a joint cannot go on from what a state has gone through on this rank.
+
+    A state without a joint's arrays starts unbroken.
+    """
+    if problem.joint is None:
+        return
+    needed = {name: np.shape(x) for name, x in problem.joint.start(problem.surface.count).items()}
+    found = {name: np.shape(x) for name, x in read_committed(problem, state).items()}
+    found.pop(RAISED, None)
+    if found != needed:
+        yield (
+            f"the state is of another joint law (it has {_list_shapes(found)}, and "
+            f"{type(problem.joint).__name__} needs {_list_shapes(needed)}): give a state of this "
+            "problem"
+        )
+
+
+def _list_shapes(shapes: dict[str, tuple[int, ...]]) -> str:
+    """Return names and shapes of arrays as words."""
+    return ", ".join(f"{name} {shapes[name]}" for name in sorted(shapes)) or "nothing"
 
 
 def initial_state(problem: ContactProblem, t: float = 0.0) -> State:

@@ -25,7 +25,7 @@ class JointsByPart:
     """
 
     laws: Mapping[str, JointLaw]
-    part: Indices
+    part: Indices = field(repr=False)
     _bound: tuple[tuple[Any, Indices], ...] = field(default=(), repr=False)
 
     def __post_init__(self) -> None:
@@ -55,6 +55,23 @@ class JointsByPart:
             taken: Any = law if at_points is None else at_points(surface.points[places])
             bound.append((_take_rows(taken, rows, len(slots_of_part)), places))
         return replace(self, _bound=tuple(bound))
+
+    def list_values(self, surface: ContactSurface) -> list[Array]:
+        """Return the numbers of each point, arrays (m,) in the same order on all ranks.
+
+        They are the part, and each value of each law, zero at points of other parts. Of a law of a
+        user's own only the part is known.
+
+        Args:
+            surface: whose points they are.
+        """
+        columns = [self.part[surface.slots].astype(float)]
+        for law, places in self._bound:
+            for owner, name in _list_numbers_of(law):
+                column = np.zeros(surface.count)
+                column[places] = owner.spread(name, len(places))
+                columns.append(column)
+        return columns
 
     @property
     def rubs(self) -> bool:
@@ -222,6 +239,17 @@ def _pick_committed(places: Indices, committed: Committed) -> Committed:
 def _pick(places: Indices, committed: Committed, *arrays: Array) -> tuple[Any, ...]:
     """Return the rows of committed and other arrays at some points."""
     return (_pick_committed(places, committed), *(array[places] for array in arrays))
+
+
+def _list_numbers_of(law: Any) -> list[tuple[OfPoints, str]]:
+    """Return the values by point of a law, and of what it holds, each as its owner and name."""
+    found: list[tuple[OfPoints, str]] = []
+    for name, value in vars(law).items() if isinstance(law, OfPoints) else ():
+        if isinstance(value, OfPoints):
+            found += _list_numbers_of(value)
+        elif isinstance(value, int | float | tuple) and not isinstance(value, bool):
+            found.append((law, name))
+    return found
 
 
 def _take_rows(law: Any, rows: Indices, count: int) -> Any:

@@ -21,7 +21,7 @@ from ...core.algebra import Array, Mask, from_each, largest, max_abs
 from ...core.checks import several
 from ...core.errors import InputError
 from ...core.internal import remembers
-from ...core.joints import MEMORY
+from ...core.joints import MEMORY, pose_joint
 from ...core.problem import ContactProblem
 from ...core.state_checks import check_problem_given, check_sizes
 from ...core.step import State
@@ -167,7 +167,10 @@ def _compute_missing(problem: ContactProblem, u0: Array, state: State, was_held:
     """
     elastic = problem.system.internal_force(u0)
     force = np.asarray(elastic - problem.system.load.at_rest(0.0) + _contact_force(problem, state))
-    sizes = np.array([max_abs(force[~was_held]), max_abs(elastic), max_abs(force)])
+    # Of a body that only the prestress of a joint loads, the total reactions are the forces whose
+    # rounding is missing.
+    reaction = max_abs(state.r_n)
+    sizes = np.array([max_abs(force[~was_held]), reaction, max_abs(elastic), max_abs(force)])
     missing, *largest_forces = problem.surface.comm.max(sizes)
     if missing > BALANCED * max(largest_forces):
         raise InputError(
@@ -278,9 +281,18 @@ def _refuse_moved(
 
 
 def _contact_force(problem: ContactProblem, state: State) -> Array:
-    """Return B_nᵀ r_n + B_tᵀ r_t (n,) [N] on the system's own unknowns, without frames."""
+    """Return B_nᵀ r_n + B_tᵀ r_t (n,) [N] on the system's own unknowns, without frames.
+
+    The reactions of a joint are the total ones, and only what they are more than its prestress
+    loads the bodies.
+    """
     surface = problem.surface
-    force = surface.reaction_load(state.r_n, problem.system.rows, state.r_t)
+    r_n, r_t = state.r_n, state.r_t
+    if problem.joint is not None:
+        normal, shear = pose_joint(problem, state, 0.0).prestress
+        r_n = r_n - normal
+        r_t = None if r_t is None else r_t - shear
+    force = surface.reaction_load(r_n, problem.system.rows, r_t)
     if surface.coupling is not None:  # the load of relative unknowns is Rᵀ f, and R⁻¹ = 2 - R
         force = 2.0 * force - surface.coupling.transpose_apply(force)
     return surface.along_axes(force)

@@ -47,6 +47,7 @@ from ...core.internal import MATERIAL, remembers, select_memory
 from ...core.joints import MEMORY as JOINT
 from ...core.own_files import is_own, open_to_read
 from ...core.problem import ContactProblem
+from ...core.state_checks import check_sizes
 from ...core.step import Scheme, State
 from ..time_steps import TimeSteps
 from .folder import CHECKPOINT, check_format
@@ -241,7 +242,7 @@ def read_checkpoint(
 
     Raises:
         InputError: the checkpoint is missing, damaged, of an unknown format, or of another problem,
-            dt (or plan of them) or scheme.
+            dt (or plan of them) or scheme; or its state is of another law of a joint.
     """
     # Rank 0 reads the file, and all ranks hear what it is of.
     file = folder / CHECKPOINT
@@ -269,6 +270,7 @@ def read_checkpoint(
         memory=memory,
         **{name: arrays[name] for name in ("u", "v", *CONTACT)},
     )
+    check_sizes("simulate", problem, state)
     place = RestartPoint(state, about["t_start"], about["k_start"], about["base"], about["halved"])
     if "dt" in changes:  # steps of another length are counted from here
         place = replace(place, t_start=state.t, k_start=place.number, base=0)

@@ -18,9 +18,11 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array, Indices, from_each
+from ...core.collective import together
+from ...core.joints import pose_joint
 from ...core.matrix_checks import probe
 from ...core.problem import ContactProblem, replace_tuples
-from ...core.step import Scheme
+from ...core.step import Scheme, State
 from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem, evaluate_history
 from ..time_steps import TimeSteps, describe_plan, list_pieces
@@ -73,7 +75,6 @@ def identify(
     places = np.arange(SAMPLES)
     times = start + (end - start) * (places + probe(places, 0) + 0.5) / SAMPLES
     friction = replace_tuples(problem.friction, surface, partial(_gather_values, surface))
-    joint = replace_tuples(problem.joint, surface, partial(_gather_values, surface))
     return {
         "unknowns": system.space.unknowns,
         "contact points": surface.total,
@@ -82,7 +83,7 @@ def identify(
         "mass": write_as_text(problem.mass),
         "impact law": write_as_text(problem.impact),
         "friction law": write_as_text(friction),
-        **({} if joint is None else {"joint": write_as_text(joint)}),
+        **_describe_joint(problem),
         "stiffness": [_multiply(system, w, system.K @ x) for w, x in pairs],
         "internal force": _describe_internal(system, probes[0]),
         "mass matrix": [_multiply(system, w, system.M @ x) for w, x in pairs],
@@ -266,6 +267,32 @@ def _gather_values(surface: ContactSurface, values: tuple[Any, ...]) -> tuple[An
         return values
     numbered = [pair for slots, values in parts for pair in zip(slots, values, strict=True)]
     return tuple(value for _, value in sorted(numbered, key=lambda pair: pair[0]))
+
+
+def _describe_joint(problem: ContactProblem) -> Identity:
+    """Return the law of a joint as text, and its values by point; nothing without one. Collective.
+
+    The text does not tell the values of functions and of long arrays.
+    """
+    surface = problem.surface
+    law: Any = problem.joint
+    if law is None:
+        return {}
+    text = write_as_text(replace_tuples(law, surface, partial(_gather_values, surface)))
+    columns: list[Array] = []
+    with together(surface.comm):  # the law may be the user's
+        # Forces of closed points that nothing has happened to. A law of slip rates has none at
+        # rest; the values of its functions are in its text.
+        if not hasattr(law, "at_speed"):
+            none = np.zeros(problem.system.rows)
+            closed = np.ones(surface.count, dtype=bool)
+            start = State(0.0, 0, none, none, np.zeros(surface.count), closed)
+            joint = pose_joint(problem, start, 0.0)
+            columns += joint.ask(np.zeros(surface.count), np.zeros(joint.s0.shape))
+        # They do not tell what else a part loses its strength over.
+        if hasattr(law, "list_values"):
+            columns += law.list_values(surface)
+    return {"joint": text, "strength of the joint": _sum_columns(surface, columns)}
 
 
 def _describe_friction(problem: ContactProblem) -> Numbers:
