@@ -143,7 +143,8 @@ def begin_from(
         return 2.0 * x - surface.coupling @ x
 
     r_t = state.r_t if problem.frictional else None
-    first = State(0.0, 0, turn(u0), turn(v0), state.r_n, state.active, r_t=r_t)
+    motion = (turn(u0), turn(v0))
+    first = State(0.0, 0, *motion, state.r_n, state.active, r_t=r_t, turned=surface.turned)
     load = replace(load, constant=load.constant + force)
     return replace(problem, system=system.changed(u0=u0, v0=v0, load=load)), first
 
