@@ -31,6 +31,7 @@ from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.extract import MeshArrays, add_arrays
 from vi_contact.meshes.two_blocks import Blocks
 from vi_contact.practice.soil.moving_base import base_motion
+from vi_contact.run.files.identity import FRAMES, find_differences
 from vi_contact.solvers.volume.route import Volume
 
 COMM = MPI.COMM_WORLD
@@ -726,3 +727,66 @@ def test_a_pair_with_gaps_round_corners():
     same(lone, fem.contact_pair(system, tags["box_bottom"], floor, matching=fem.DualMortar()))
     with pytest.raises(InputError, match="have no node of 'under_top' opposite"):
         fem.contact_pair(system, hull, floor)
+
+
+def tilted_walls() -> tuple[Any, Any]:
+    """A block between two half-spaces that are tilted by 0.15 rad, so that its corner is oblique
+    to the axes, and the surface of both faces."""
+    mesh, tags = fem.build_mesh(BlockMesh(divisions=(2, 2)), COMM)
+    stone = vc.LinearElastic(E=1e7, nu=0.2, rho=2000.0)
+    system = fem.assemble(mesh, stone, loads=[fem.Traction(tags["top"], (2e4, -1e5))])
+    c, s = np.cos(0.15), np.sin(0.15)
+    floor = vc.HalfSpace(point=(0.0, -0.2), normal=(s, c))
+    wall = vc.HalfSpace(point=(1.2, 0.0), normal=(-c, s))
+    parts = [
+        fem.contact_surface(system, tags[name], obstacle=obstacle)
+        for name, obstacle in (("bottom", floor), ("right", wall))
+    ]
+    return system, fem.joined_surfaces(*parts)
+
+
+@pytest.mark.serial
+def test_states_of_other_frames_are_refused(tmp_path):
+    """Where corners rub, displacements are along the axes: a state in the frames of nodes is
+    refused by stages, runs and restarts, both ways, and one on the traces goes on rightly."""
+    system, surface = tilted_walls()
+    mass = vc.ConsistentMass()
+
+    def pose(where: Any, **laws: Any) -> ContactProblem:
+        return ContactProblem(system, where, mass=mass, **laws)
+
+    smooth, rough = pose(surface), pose(surface, friction=vc.Coulomb(0.3))
+    traced = pose(surface.with_own_laws())
+    pressed, right = vc.static_equilibrium(smooth), vc.static_equilibrium(traced)
+    refused = r"those of the problem along the axes, .*: make both problems on surface.with_own_la"
+    how: dict[str, Any] = {"dt": 1e-3, "scheme": vc.Midpoint()}
+    moved, _ = next(vc.march(smooth, steps=1, **how))
+    for state in (pressed, moved, moved.with_velocity(0.0 * moved.v)):
+        with pytest.raises(InputError, match="quasi_static: .*" + refused):
+            next(vc.quasi_static(rough, [1.0], state=state))
+        with pytest.raises(InputError, match="march: .*" + refused):
+            next(vc.march(rough, steps=1, state=state, **how))
+    with pytest.raises(InputError, match="those of the problem in frames of contact nodes"):
+        next(vc.march(smooth, steps=1, state=vc.static_equilibrium(rough), **how))
+    # restarts, also those that change the problem
+    for name, problem in (("smooth", smooth), ("traced", traced)):
+        vc.simulate(problem, steps=2, out=tmp_path / name, record=[vc.Energy()], **how)
+    for changed in (False, True):
+        again: dict[str, Any] = {"steps": 3, "changed": changed, "record": [vc.Energy()]}
+        with pytest.raises(InputError, match=r"frames = .* make both problems on surface.with_own"):
+            vc.simulate(rough, restart=tmp_path / "smooth", out=tmp_path / "rough", **again, **how)
+    # the same place, by hand along the axes and by the problem on the traces: the same answer
+    place = smooth.cartesian(pressed.u)
+    by_hand = replace(pressed, u=place, turned=None)
+    assert np.abs(right.u - place).max() < 1e-9 * np.abs(place).max()
+    expected, found = (next(vc.quasi_static(rough, [1.0], state=s)) for s in (by_hand, right))
+    size = np.abs(expected.r_n).max()
+    assert np.abs(found.r_n - expected.r_n).max() < 1e-7 * size
+    assert np.abs(found.r_t - expected.r_t).max() < 1e-7 * size
+    assert 0.0 < np.abs(found.r_t).max() < 0.1 * size  # 0.29 of it where frames are mistaken
+    solution = vc.simulate(
+        rough, restart=tmp_path / "traced", out=tmp_path / "rough", **again, **how
+    )
+    assert solution.state.k == 3 and solution.facts["worst_certificate"] <= 1e-9
+    # a checkpoint that does not tell its frames, of an earlier commit, is not refused for that
+    assert find_differences({FRAMES: "along the axes"}, {}) == {}

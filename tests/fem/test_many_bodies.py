@@ -500,7 +500,8 @@ def test_walls_that_slide_past_a_corner():
 @pytest.mark.parametrize("kind", ["springs", "held", "frictionless corners"])
 def test_other_conditions_of_a_wall(kind):
     """Joints on springs, joints that may pull, and nodes in several pairs that slide freely: 1 MPa
-    in the beds all the same, and certified steps."""
+    in the beds all the same, and certified steps. Joints that may pull hold a little friction in
+    the heads, which depends on the way of the iteration: up to 2e-5 of the pressure."""
     system, problem = bond()
     surface = {
         "springs": lambda s: s.on_springs(1e10),
@@ -511,12 +512,14 @@ def test_other_conditions_of_a_wall(kind):
     state = vc.static_equilibrium(problem)
     upright = np.abs(surface.normals[:, 1]) > 0.5
     pressure = state.r_n / surface.weights
-    assert pressure[upright] == pytest.approx(np.full(upright.sum(), 1e6), rel=1e-7)
+    near = 1e-4 if kind == "held" else 1e-7
+    assert pressure[upright] == pytest.approx(np.full(upright.sum(), 1e6), rel=near)
     reports = [report for _, report in vc.march(problem, dt=5e-4, steps=5)]
     assert max(report.certificate.worst for report in reports) <= 1e-9
     if kind == "frictionless corners":
         corners = np.concatenate(surface.corners)
-        assert all(np.abs(report.new.r_t[corners]).max() == 0.0 for report in reports)
+        for report in reports:
+            assert np.abs(report.new.r_t[corners]).max() <= 1e-20 * np.abs(report.new.r_t).max()
 
 
 @pytest.mark.serial

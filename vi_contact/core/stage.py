@@ -91,6 +91,7 @@ class Stage:
         of_momentum: whether the mean acceleration of the step is (v1 - v0)/dt.
         between: u0 (n,) where the internal force is that of both ends at once, p̄(u0, x), of a body
             that turns (``core.internal.TwoEndForce``); x is then the displacement at the end.
+        turned: whether the unknowns are in the frames of contact nodes; None where nobody asks.
     """
 
     guess: Array
@@ -113,6 +114,7 @@ class Stage:
     end: float = 1.0
     of_momentum: bool = True
     between: Array | None = None
+    turned: bool | None = None
 
     def find_internal(self, system: SemiDiscreteSystem, d: Array | None = None) -> Array:
         """Return the internal force (n,) [N] of the balance at an increment; None for zero.

@@ -16,6 +16,8 @@ from .step import State
 
 # Of the largest displacement or gap: how far round-off may put a body into its obstacle.
 OVERLAP = 1e-9
+# Friction at corners makes another surface, whose unknowns are others (core.corners).
+ON_TRACES = "make both problems on surface.with_own_laws()"
 
 
 def check_problem_given(owner: str, value: Any) -> None:
@@ -53,6 +55,12 @@ def _find_defects_of_state(problem: ContactProblem, state: State) -> Iterator[st
 
     Its memory is for its scheme, and only what materials and joints remember is looked at.
     """
+    if state.turned not in (None, problem.surface.turned):
+        yield (
+            f"the unknowns of the state are {describe_frames(turned=not problem.surface.turned)} "
+            f"and those of the problem {describe_frames(turned=problem.surface.turned)}: "
+            f"{ON_TRACES}"
+        )
     yield from _find_defects_of_material(problem, state)
     yield from _find_defects_of_joint(problem, state)
     n = problem.system.rows
@@ -119,6 +127,11 @@ def _list_shapes(shapes: dict[str, tuple[int, ...]]) -> str:
     return ", ".join(f"{name} {shapes[name]}" for name in sorted(shapes)) or "nothing"
 
 
+def describe_frames(*, turned: bool) -> str:
+    """Return the words for the unknowns of a surface (``ContactSurface.turned``)."""
+    return "in frames of contact nodes" if turned else "along the axes, as where corners rub"
+
+
 def initial_state(problem: ContactProblem, t: float = 0.0) -> State:
     """Return u0 and v0 of the system in the rotated basis, without reaction. Collective.
 
@@ -143,4 +156,12 @@ def initial_state(problem: ContactProblem, t: float = 0.0) -> State:
             f"enlarge the gap, or {PRESS_FIT}"
         )
     none = np.zeros(surface.count)
-    return State(t, 0, system.u0.copy(), system.v0.copy(), none, surface.bilateral.copy())
+    return State(
+        t,
+        0,
+        system.u0.copy(),
+        system.v0.copy(),
+        none,
+        surface.bilateral.copy(),
+        turned=surface.turned,
+    )

@@ -70,6 +70,8 @@ class State:
             materials remember, arrays of owned cells (``core.internal.MATERIAL``).
         r_t: tangential reactions (m, d - 1) [N] of that step, None without friction.
         certificate: of the equilibrium that the state is; None of states that steps have led to.
+        turned: whether u and v are in the frames of contact nodes (``ContactSurface.turned``);
+            None of a state made by hand, which is taken to be of the problem it is given to.
     """
 
     t: float
@@ -81,6 +83,7 @@ class State:
     memory: Mapping[str, Array] = field(default_factory=dict)
     r_t: Array | None = None
     certificate: float | None = None
+    turned: bool | None = None
 
     def __repr__(self) -> str:
         """Return time, step and sizes on this rank: not the arrays."""
@@ -93,7 +96,8 @@ class State:
 
     def with_velocity(self, v: Array) -> "State":
         """Return the state with another velocity."""
-        return State(self.t, self.k, self.u, v, self.r_n, self.active, self.memory, self.r_t)
+        contact = (self.r_n, self.active, self.memory, self.r_t)
+        return State(self.t, self.k, self.u, v, *contact, turned=self.turned)
 
 
 class StepForces(Protocol):

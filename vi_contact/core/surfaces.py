@@ -236,6 +236,11 @@ class ContactSurface:
         """
         return self.nodes if self.traces is None else None
 
+    @property
+    def turned(self) -> bool:
+        """Say whether unknowns are in frames of nodes or relative, not displacements along axes."""
+        return self.basis is not None or self.coupling is not None
+
     def in_frames(self, u: Array) -> Array:
         """Return T⁻¹ u: displacements (n,) along the axes, turned into the nodal frames.
 

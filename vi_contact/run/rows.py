@@ -89,6 +89,7 @@ def join_states(states: Sequence[State]) -> State:
         active=np.stack([state.active for state in states]),
         memory=memory,
         r_t=r_t,
+        turned=first.turned,
     )
 
 
@@ -103,7 +104,8 @@ def split_states(many: State) -> LazyRows:
             name: value[row] if value.ndim == 2 else value for name, value in many.memory.items()
         }
         r_t = None if many.r_t is None else many.r_t[row]
-        return State(many.t, many.k, u, v, many.r_n[row], many.active[row], memory, r_t)
+        contact = (many.r_n[row], many.active[row], memory, r_t)
+        return State(many.t, many.k, u, v, *contact, turned=many.turned)
 
     return LazyRows(split_state)
 

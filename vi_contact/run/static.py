@@ -223,7 +223,7 @@ class Equilibria:
             if problem.joint is not None:
                 return self._solve_joint(step, old)
             certified = self.solver.solve(step)
-        return _stand_still(old, t, certified.result, certified.certificate)
+        return _stand_still(problem, old, t, certified.result, certified.certificate)
 
     def _solve_nonlinear(self, old: State, t: float) -> State:
         """Return the equilibrium of a body that is not linear at a time.
@@ -240,7 +240,8 @@ class Equilibria:
         step = pose(problem, stage, self._K, system)
         certified = self.solver.solve(step)
         answer = complete(stage, step, certified.result)
-        state = remember_material(system, _stand_still(old, t, answer, certified.certificate))
+        state = _stand_still(problem, old, t, answer, certified.certificate)
+        state = remember_material(system, state)
         whole = certify_material(system, certified.certificate, state, self._tolerance)
         return replace(state, certificate=whole.worst)
 
@@ -255,16 +256,21 @@ class Equilibria:
         step, certified = self._joints.solve(base, joint)
         result = certified.result
         total = replace(result, r_n=result.r_n - step.joint.pull)
-        state = _stand_still(old, base.t, total, certified.certificate)
+        state = _stand_still(self._problem, old, base.t, total, certified.certificate)
         return joint_steps.commit(state, step, result)
 
 
 def _stand_still(
-    old: State, t: float, answer: Answer | StepResult, certificate: Certificate
+    problem: ContactProblem,
+    old: State,
+    t: float,
+    answer: Answer | StepResult,
+    certificate: Certificate,
 ) -> State:
     """Return the state of an equilibrium, which has no velocity.
 
     Args:
+        problem: what stands.
         old: the state before.
         t: the time [s].
         answer: displacements, reactions and the contact set.
@@ -279,6 +285,7 @@ def _stand_still(
         answer.active,
         r_t=answer.r_t,
         certificate=certificate.worst,
+        turned=problem.surface.turned,
     )
 
 
@@ -305,12 +312,13 @@ def quasi_static(
         times: increasing, none before ``state.t``; the loads are taken there, excitations are not.
         state: where the history starts, from ``static_equilibrium`` or an earlier history; u0 at t
             = 0 without reactions when None. A body pressed without friction first: the state of
-            that problem.
+            that problem, which is made on ``surface.with_own_laws()`` where the surface has corners
+            that rub later.
         tolerance: of the certificate of every answer.
 
     Raises:
-        InputError: times that do not increase; friction that depends on the slip rate; loads that
-            drive a rigid motion which nothing stops.
+        InputError: times that do not increase; a state of other unknowns; friction that depends on
+            the slip rate; loads that drive a rigid motion which nothing stops.
         StepFailure: no answer below the certificate tolerance.
     """
     check_problem_given("quasi_static", problem)

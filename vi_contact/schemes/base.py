@@ -176,6 +176,7 @@ def position_stage(
         end=end,
         of_momentum=of_momentum,
         between=between,
+        turned=problem.surface.turned,
     )
 
 
@@ -192,7 +193,8 @@ def end_state(
         memory: what the scheme carries on; None for nothing.
     """
     kept = {} if memory is None else memory
-    return State(stage.t, stage.k, u, v, answer.r_n, answer.active, kept, answer.r_t)
+    contact = (answer.r_n, answer.active, kept, answer.r_t)
+    return State(stage.t, stage.k, u, v, *contact, turned=stage.turned)
 
 
 def check_balance(name: str, problem: ContactProblem) -> None:

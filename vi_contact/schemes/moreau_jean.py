@@ -163,6 +163,7 @@ class MoreauJean(SingleStep):
             t=state.t + dt,
             k=state.k + 1,
             rate_factor=1.0,
+            turned=surface.turned,
         )
 
     def finish(

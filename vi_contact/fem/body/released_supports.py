@@ -146,7 +146,17 @@ def begin_from(
     r_t = state.r_t if problem.frictional else None
     # What a joint has gone through is its own, whatever supports there are.
     memory = {name: x for name, x in state.memory.items() if name.startswith(MEMORY)}
-    first = State(0.0, 0, turn(u0), turn(v0), state.r_n, state.active, memory, r_t)
+    first = State(
+        t=0.0,
+        k=0,
+        u=turn(u0),
+        v=turn(v0),
+        r_n=state.r_n,
+        active=state.active,
+        memory=memory,
+        r_t=r_t,
+        turned=surface.turned,
+    )
     load = replace(load, constant=load.constant + force)
     return replace(problem, system=system.changed(u0=u0, v0=v0, load=load)), first
 

@@ -47,11 +47,11 @@ from ...core.internal import MATERIAL, remembers, select_memory
 from ...core.joints import MEMORY as JOINT
 from ...core.own_files import is_own, open_to_read
 from ...core.problem import ContactProblem
-from ...core.state_checks import check_sizes
+from ...core.state_checks import ON_TRACES, check_sizes
 from ...core.step import Scheme, State
 from ..time_steps import TimeSteps
 from .folder import CHECKPOINT, check_format
-from .identity import FIXED, find_differences, identify
+from .identity import FIXED, FRAMES, find_differences, identify
 
 log = logging.getLogger(__name__)
 Arrays = dict[str, Any]
@@ -268,6 +268,7 @@ def read_checkpoint(
         about["t"],
         about["k"],
         memory=memory,
+        turned=problem.surface.turned,
         **{name: arrays[name] for name in ("u", "v", *CONTACT)},
     )
     check_sizes("simulate", problem, state)
@@ -377,7 +378,9 @@ def _compare(
     for name, how in changes.items():
         if name in FIXED or not changed:
             remedy = "or start a new one"
-            if name not in FIXED:
+            if name == FRAMES:
+                remedy = f"or {ON_TRACES}"
+            elif name not in FIXED:
                 remedy = f"{remedy}, or allow it by name (changed=True)"
             raise InputError(
                 f"the checkpoint '{file}' is of a run with {how}: restart the same run, {remedy}"

@@ -22,6 +22,7 @@ from ...core.collective import together
 from ...core.joints import pose_joint
 from ...core.matrix_checks import probe
 from ...core.problem import ContactProblem, replace_tuples
+from ...core.state_checks import describe_frames
 from ...core.step import Scheme, State
 from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem, evaluate_history
@@ -35,7 +36,8 @@ PROBES = 2  # vectors w
 SAMPLES = 256  # times of functions of time alone, all over the run
 EARLY = 5  # times of other loads, which may have to be marched to: in the first steps
 STEPS = 32  # how many steps are the first ones
-FIXED = ("unknowns", "contact points")  # what a restart can by no means change
+FRAMES = "frames"
+FIXED = ("unknowns", "contact points", FRAMES)  # what a restart can by no means change
 STRETCH = 0.02  # by which the internal force of a body that is not linear is looked at
 SHOWN = 300  # characters of a law in a sentence
 SPEEDS = (0.0, 1e-3, 1e-1, 10.0)  # slip rates [m/s] at which friction is looked at
@@ -78,6 +80,7 @@ def identify(
     return {
         "unknowns": system.space.unknowns,
         "contact points": surface.total,
+        FRAMES: describe_frames(turned=surface.turned),
         "dt": describe_plan(dt),
         "scheme": write_as_text(scheme),
         "mass": write_as_text(problem.mass),
@@ -110,6 +113,8 @@ def find_differences(ours: Identity, theirs: Mapping[str, Any]) -> dict[str, str
     """Return name -> how, of the facts of theirs that are others in ours."""
     changes: dict[str, str] = {}
     for name, our in ours.items():
+        if name == FRAMES and name not in theirs:
+            continue  # a checkpoint written before this was told
         their = theirs.get(name)
         if isinstance(our, list):
             if not _agree_in_numbers(our, their):
