@@ -34,6 +34,7 @@ class Traces:
         normal: B_n (m, k).
         tangential: B_t (m (d - 1), k), the tangents of a condition side by side; rows of zeros
             where a tangent is prescribed.
+        width: d - 1, which a rank without conditions cannot tell from its rows.
     """
 
     comm: Comm
@@ -43,6 +44,7 @@ class Traces:
     places: Indices
     normal: sp.csr_matrix
     tangential: sp.csr_matrix
+    width: int
 
     def normal_values(self, x: Array) -> Array:
         """Return B_n x (m,), or rows (k, m) of rows. Collective.
@@ -59,9 +61,7 @@ class Traces:
             x: the unknowns (n,) of this rank, or rows (k, n).
         """
         values = _multiply(self.tangential, self._gather(x))
-        m = self.normal.shape[0]
-        width = self.tangential.shape[0] // m if m else 0
-        return values.reshape(*x.shape[:-1], m, width)
+        return values.reshape(*x.shape[:-1], self.normal.shape[0], self.width)
 
     def load(self, r_n: Array, rows: int, r_t: Array | None = None) -> Array:
         """Return B_nᵀ r_n + B_tᵀ r_t (rows,) on the unknowns of this rank. Collective.
@@ -95,10 +95,11 @@ class Traces:
 
     def without_tangents(self, rows: Indices) -> "Traces":
         """Return the same traces, of which some conditions (rows) have no tangents."""
-        width = self.moves.shape[1]
         keep = np.ones(self.tangential.shape[0])
-        keep[(rows[:, None] * width + np.arange(width)).ravel()] = 0.0
-        return replace(self, tangential=_drop_zeros(sp.diags([keep], [0]) @ self.tangential))
+        keep[(rows[:, None] * self.width + np.arange(self.width)).ravel()] = 0.0
+        tangential = self.tangential.copy()
+        tangential.data *= np.repeat(keep, np.diff(tangential.indptr))
+        return replace(self, tangential=_drop_zeros(tangential))
 
     def read_here(self, *, frictional: bool) -> Indices:
         """Return the unknowns of this rank that a condition of any rank reads. Collective.
@@ -114,9 +115,8 @@ class Traces:
     @cached_property
     def moves(self) -> Mask:
         """Return which tangents (m, d - 1) are not prescribed."""
-        m = self.normal.shape[0]
         entries = np.diff(self.tangential.indptr)
-        return np.asarray(entries.reshape(m, -1) > 0)
+        return np.asarray(entries.reshape(self.normal.shape[0], self.width) > 0)
 
     @cached_property
     def every(self) -> sp.csr_matrix:
@@ -131,8 +131,7 @@ class Traces:
 
         # Conditions stand rank after rank, and behind all their normals all tangents.
         total = sum(map(len, slots))
-        width = (rows.shape[0] - total) // max(total, 1)
-        tangents = total + np.arange(total * width).reshape(total, width)
+        tangents = total + np.arange(total * self.width).reshape(total, self.width)
         order = np.argsort(np.concatenate(slots), kind="stable")
         places = np.column_stack([np.arange(total), tangents])[order]
         return sp.csr_matrix(rows[places.ravel()])
@@ -152,6 +151,7 @@ def make_traces(
     slots: Indices,
     rows: tuple[sp.csr_matrix, sp.csr_matrix],
     *,
+    width: int,
     first: int,
     count: int,
 ) -> Traces:
@@ -162,6 +162,7 @@ def make_traces(
         slots: (m,) the numbers of this rank's conditions among those of all ranks.
         rows: B_n (m, n) and B_t (m (d - 1), n) of this rank's conditions, with a column for every
             unknown of all ranks.
+        width: d - 1, tangents of a condition.
         first: the number of this rank's first unknown.
         count: how many it owns.
     """
@@ -177,6 +178,7 @@ def make_traces(
         places=places,
         normal=normal[:, unknowns],
         tangential=tangential[:, unknowns],
+        width=width,
     )
 
 

@@ -190,7 +190,7 @@ def trace_conditions(space: NodalSpace, parts: Sequence[NodalConditions], slots:
         tangential = sp.csr_matrix(sp.csr_matrix(sp.vstack(along))[side_by_side])
     n = len(space.ids)
     first = space.algebra.first(n)
-    return make_traces(space.comm, slots, (normal, tangential), first=first, count=n)
+    return make_traces(space.comm, slots, (normal, tangential), width=d - 1, first=first, count=n)
 
 
 def find_own_tangents(parts: Sequence[NodalConditions]) -> tuple[Array, Mask]:
