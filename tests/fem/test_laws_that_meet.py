@@ -58,7 +58,8 @@ def test_a_joint_that_has_cracked_stays_cracked_after_a_release() -> None:
     held = block(joint, lift=6e4, clamped="top")
     *_, (state, _) = vc.march(held, scheme=vc.Midpoint(), dt=1e-3, steps=5)
     free = block(joint, lift=6e4)
-    marks = {"joint_kappa": np.full(held.surface.count, 5e-5)}
+    marks = {f"joint_{name}": x for name, x in joint.start(held.surface.count).items()}
+    marks["joint_kappa"] = np.full(held.surface.count, 5e-5)
     cracked = vc.State(
         state.t, state.k, state.u, state.v, state.r_n, state.active, marks, state.r_t
     )
