@@ -165,7 +165,8 @@ def find_momenta(problem: vc.ContactProblem, state: Any) -> np.ndarray:
     u = problem.cartesian(state.u).reshape(-1, d)
     p = (system.M @ problem.cartesian(state.v)).reshape(-1, d)
     y = system.space.coordinates[::d] + u
-    spin = np.cross(y, p).reshape(len(y), -1)
+    planes = [(0, 1)] if d == 2 else [(1, 2), (2, 0), (0, 1)]
+    spin = np.column_stack([y[:, i] * p[:, j] - y[:, j] * p[:, i] for i, j in planes])
     return np.asarray(system.algebra.comm.sum(np.concatenate([p.sum(axis=0), spin.sum(axis=0)])))
 
 
