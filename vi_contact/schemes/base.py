@@ -163,6 +163,7 @@ def position_stage(
         load=load,
         scale=scale,
         bound=problem.surface.gap(after),
+        turned=problem.surface.turned,
         slip0=problem.slip_origin(state.u, state.t, after),
         active=state.active if active is None else active,
         t=after,
@@ -176,7 +177,6 @@ def position_stage(
         end=end,
         of_momentum=of_momentum,
         between=between,
-        turned=problem.surface.turned,
     )
 
 
