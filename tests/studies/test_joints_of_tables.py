@@ -98,7 +98,7 @@ def test_lambda_is_told_by_a_check(tmp_path: Path, capsys: pytest.CaptureFixture
     from vi_contact.practice.cli import main
 
     path = written(tmp_path)
-    main(["run", str(path), "--check"])
+    assert main(["run", str(path), "--check", "--out", str(tmp_path / "out")]) == 0
     told = capsys.readouterr().out
     assert "joint: lambda of a step" in told and "Joint" in told
 
