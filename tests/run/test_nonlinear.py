@@ -44,7 +44,7 @@ def test_every_scheme_steps_a_chain_of_cubic_springs(scheme: Any) -> None:
         scheme=scheme,
         solver=vc.Condensed(),
         dt=2e-3,
-        steps=200,
+        steps=100,
         record=[vc.Energy(), vc.Contact()],
         progress=False,
     )
