@@ -191,8 +191,8 @@ def test_released_supports_leave_their_reactions(comm: Any) -> None:
     assert off <= 1e-9 * size
 
 
+@pytest.mark.serial
 @pytest.mark.long
-@pytest.mark.two_ranks
 @pytest.mark.promise("guide/nonlinear.md", "keeps 99 % of its energy over five turns", bound="0.99")
 def test_a_block_spins(comm: Any) -> None:
     """Once a second, by HHT in 60 steps a turn, far above the ground."""

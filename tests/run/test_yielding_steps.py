@@ -513,9 +513,7 @@ def test_hexahedra_and_tetrahedra_are_thrown(comm: Any) -> None:
     """The same laws in space, with bbar and with degree 2."""
     for simplices, divisions in ((False, (2, 2, 2)), (True, (1, 1, 1))):
         mesh, tags = fem.build_mesh(
-            BlockMesh(
-                lengths=(0.5, 0.5, 0.5), divisions=divisions, simplices=simplices
-            ),
+            BlockMesh(lengths=(0.5, 0.5, 0.5), divisions=divisions, simplices=simplices),
             comm,
         )
         system = fem.assemble(
