@@ -282,7 +282,8 @@ def _load_forms_once() -> None:
 
     jit.get_cached_module = once  # type: ignore[attr-defined]
     known_file = SimpleNamespace(**vars(importlib.machinery) | {"FileFinder": _known_file})
-    jit.importlib = SimpleNamespace(**vars(importlib) | {"machinery": known_file})  # type: ignore[attr-defined]
+    known_importlib = SimpleNamespace(**vars(importlib) | {"machinery": known_file})
+    jit.importlib = known_importlib  # type: ignore[attr-defined]
     _do_not_print_options(sys.modules["ffcx"])
 
 
