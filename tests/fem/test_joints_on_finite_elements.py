@@ -75,6 +75,7 @@ def crack_base(solver: str, alone: bool = False) -> Any:
     return march_block(MPI.COMM_SELF if alone else MPI.COMM_WORLD, BASE, SOLVERS[solver])
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_the_base_of_a_block_cracks(solver: str) -> None:
     """All steps certified with their strength, the ledger closes, and its parts add up; half of the
@@ -114,6 +115,7 @@ def test_ranks_change_nothing(solver: str) -> None:
         assert np.max(np.abs(ours - alone)) <= 10.0 * tolerance * np.max(np.abs(alone)), name
 
 
+@pytest.mark.two_ranks
 def test_a_restart_on_these_ranks_is_the_straight_run(comm: Any, shared_tmp: Any) -> None:
     """Committed arrays are stored by the numbers of the conditions."""
     problem = block(comm, BASE)
