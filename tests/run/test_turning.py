@@ -215,6 +215,7 @@ def test_steps_are_halved_where_a_corner_lands(comm: Any) -> None:
     assert 0.0 < lost[1] < 0.5 * lost[0]
 
 
+@pytest.mark.two_ranks
 def test_a_block_is_thrown_into_a_corner(comm: Any) -> None:
     """Floor and wall: any node may land on either. Contact creates no energy, and what the walls
     give is the change of momentum."""
