@@ -1,5 +1,5 @@
-"""Bodies, laws of contact, schemes and solvers meet: each group of four runs certified with a closed
-ledger, the same by all solvers, or is refused in a sentence before any step."""
+"""Bodies, laws of contact, schemes and solvers meet: each four run certified with a closed ledger,
+the same by all solvers, or are refused in a sentence before any step."""
 
 from __future__ import annotations
 
