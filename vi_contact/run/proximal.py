@@ -26,7 +26,7 @@ import numpy as np
 
 from ..core.algebra import Array, EffectiveMatrix, Mask, largest, max_abs
 from ..core.certificate import Certificate
-from ..core.errors import InputError, StepFailure
+from ..core.errors import NoEquilibrium, StepFailure
 from ..core.problem import ContactProblem
 from ..core.step import Solver, StepProblem, StepResult
 from ..core.verify import kkt_residual
@@ -103,9 +103,15 @@ class _Progress(Passes[_Pass]):
 
 
 class Proximal:
-    """Iterate by the proximal-point method for the matrix ``K``, which is singular."""
+    """Iterate by the proximal-point method for the matrix ``K``, which is singular.
+
+    Attributes:
+        step: the stage.
+        motion: the last increment d (n,) [m]; where there is no equilibrium, what the loads drive.
+    """
 
     step: StepProblem
+    motion: Array
 
     def __init__(
         self, problem: ContactProblem, K: EffectiveMatrix, solver: Solver, tolerance: float
@@ -195,6 +201,7 @@ class Proximal:
             increment = self._prepared.solve(inner)
             result = add(self.step, answer, increment, share)
             new = self._measure_motion(result.x - centre, increment.active)
+            self.motion = new.d
             there = _Pass(result, self.certificate(result), False, new)
             worst = there.worst
             yield there
@@ -273,7 +280,7 @@ class Proximal:
         return np.asarray((motion.closing > STOPPED * size) & np.isfinite(self.step.bound))
 
     def _refuse_flight(self, motion: _Motion, u: Array) -> None:
-        """Raise InputError for a rigid motion without end that loads drive. Collective.
+        """Raise NoEquilibrium for a rigid motion without end that loads drive. Collective.
 
         It bends nothing, dᵀKd = 0, the loads work on it, f·d > 0, and no contact stops it. Where
         there is an equilibrium u*, f·d is at most u*ᵀK d for such a motion, so that a work below
@@ -294,7 +301,7 @@ class Proximal:
         if work**2 < 2.0 * system.strain_energy(u) * bending:
             return
         way = self._describe_way(motion.d)
-        raise InputError(
+        raise NoEquilibrium(
             f"the body has no static equilibrium: its loads {way} and neither contact nor a "
             "prescribed displacement stops it: hold it there, change the loads, or start the "
             "dynamics from rest"
