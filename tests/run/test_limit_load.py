@@ -58,6 +58,11 @@ def test_a_stack_tilts_until_it_first_moves(mu: float, limit: float) -> None:
     assert found.multiplier <= limit * (1.0 + 1e-9)
     assert limit * (1.0 - 1e-9) < found.lost_at <= found.multiplier + RTOL * found.lost_at
     assert found.proven and "no static equilibrium" in found.reason
+    # the fastest are all that slide, or the top one alone
+    where = "4 of 5 bodies move, such as that at (0.5, 1.75)"
+    if mu < limit + 1e-9:
+        where = "4 of 5 bodies move, such as that at (0.5, 0.25)"
+    assert where in found.reason
     assert max(state.certificate for state in found.states) <= 1e-9
     assert [state.t for state in found.states] == list(found.multipliers)
     # the weight keeps its size as it turns: N = W cos, T = W sin on the lowest joint
