@@ -208,9 +208,18 @@ def test_steps_are_halved_where_a_corner_lands(comm: Any) -> None:
     assert 0.0 < lost[1] < 0.5 * lost[0]
 
 
-def test_a_block_is_thrown_into_a_corner(comm: Any) -> None:
-    """Floor and wall: any node may land on either. Contact creates no energy, and what the walls
-    give is the change of momentum."""
+@pytest.mark.parametrize(
+    ("wall", "friction"),
+    [
+        ((1.0, 0.0), vc.Frictionless()),
+        ((1.0, 0.0), vc.Coulomb(0.4)),
+        ((0.8, 0.6), vc.Coulomb(0.4)),
+    ],
+)
+def test_a_block_is_thrown_into_a_corner(comm: Any, wall: Any, friction: Any) -> None:
+    """Floor and wall, at right angles or not: any node may land on either, and rubs on both.
+    Contact creates no energy, what the walls give is the change of momentum, the ledger closes,
+    and no node is ever behind a wall."""
     mesh, _ = fem.build_mesh(
         BlockMesh(lengths=(0.5, 1.0), divisions=(2, 4), corner=(0.3, 0.2)), comm
     )
@@ -219,25 +228,61 @@ def test_a_block_is_thrown_into_a_corner(comm: Any) -> None:
         SOFT,
         initial_velocity=lambda x: np.array([-3.0, -4.0]) + 2.0 * x[:, ::-1] * [-1.0, 1.0],
     )
-    wall = vc.HalfSpace((0.0, 0.0), (1.0, 0.0))
-    surfaces = [fem.contact_surface(system, obstacle=plane) for plane in (FLOOR, wall)]
-    problem = vc.ContactProblem(system, fem.joined_surfaces(*surfaces))
-    before = None
+    planes = (FLOOR, vc.HalfSpace((0.0, 0.0), wall))
+    surface = fem.joined_surfaces(
+        *[fem.contact_surface(system, obstacle=plane) for plane in planes]
+    )
+    problem = vc.ContactProblem(system, surface, friction=friction)
+    surface = problem.surface
+    before = 0.0
     impulse = np.zeros(2)
     touched = np.zeros(2)
-    for state, report in vc.march(problem, dt=2e-3, steps=150):
-        if before is None:
+    for state, report in vc.march(problem, dt=2e-3, steps=90):
+        if not before:
             before = turning.find_energy(problem, report.old)
             momenta = turning.find_momenta(problem, report.old)
-        # obstacles press against the directions of the conditions
-        sides = -problem.surface.comm.sum(state.r_n @ problem.surface.normals)
-        impulse += 2e-3 * sides
-        touched += sides > 0.0
-        after = turning.find_energy(problem, state)
-        assert after <= before * (1.0 + 1e-10)
+        load = surface.reaction_load(state.r_n, len(state.u), state.r_t)
+        pressed = problem.cartesian(load).reshape(-1, 2)
+        impulse -= 2e-3 * surface.comm.sum(pressed.sum(axis=0))
+        on_floor, on_wall = (surface.everywhere(state.r_n) > 0.0).reshape(2, -1)
+        touched += [on_floor.sum(), on_wall.sum()]
+        gap = surface.gap(state.t) - surface.normal_values(state.u)
+        assert gap.min(initial=0.0) > -1e-12
+        assert turning.find_energy(problem, state) <= before * (1.0 + 1e-10)
+        step = energy_balance(problem, report.old, report.new, report.averages())
+        assert abs(step.defect) < 1e-11 * before
     assert np.all(touched > 0)
     change = turning.find_momenta(problem, state) - momenta
     assert np.allclose(change[:2], impulse, rtol=1e-9)
+
+
+def test_an_edge_rubs_on_floor_and_wall(comm: Any) -> None:
+    """A box slides along the edge of a floor and a wall that carry it: each takes mu times its own
+    impulse, with the nodes of the edge, which face both, in either."""
+    mu = 0.3
+    mesh, _ = fem.build_mesh(BlockMesh(lengths=(0.5, 0.5, 1.0), divisions=(1, 1, 2)), comm)
+    weight = turning.GRAVITY * STIFF.rho
+    system = fem.assemble(
+        mesh,
+        STIFF,
+        initial_velocity=(0.0, 0.0, 3.0),
+        loads=fem.BodyForce((-0.5 * weight, -weight, 0.0)),
+    )
+    planes = [vc.HalfSpace((0.0, 0.0, 0.0), normal) for normal in ((0, 1, 0), (1, 0, 0))]
+    surface = fem.joined_surfaces(
+        *[fem.contact_surface(system, obstacle=plane) for plane in planes]
+    )
+    problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(mu))
+    normal = np.zeros(2)
+    start = None
+    for state, report in vc.march(problem, dt=5e-3, steps=20):
+        if start is None:
+            start = turning.find_momenta(problem, report.old)
+        normal += 5e-3 * problem.surface.everywhere(state.r_n).reshape(2, -1).sum(axis=1)
+    change = turning.find_momenta(problem, state) - start
+    edge = problem.surface.everywhere(state.r_n).reshape(2, -1)
+    assert np.any((edge > 0.0).all(axis=0))
+    assert change[2] == pytest.approx(-mu * normal.sum(), rel=1e-3)
 
 
 @pytest.mark.serial
