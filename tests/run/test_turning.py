@@ -183,6 +183,22 @@ def test_a_column_falls_over_and_lies(comm: Any) -> None:
     assert lowest > -1e-12
 
 
+def test_the_certificate_is_of_the_forces(comm: Any) -> None:
+    """Not of the stiffness times the displacement, in which a block of stone is 300 times as
+    large: what is left over the largest force of the step, computed here, is the residual."""
+    stone = replace(STIFF, E=1e10)
+    problem = turning.rock_block(comm, RigidBlock(0.5, 1.0), 0.3, material=stone, divisions=(2, 4))
+    surface = problem.surface
+    for _, report in vc.march(problem, dt=0.01, steps=10):
+        step = report.step
+        x = report.result.x
+        rest = step.forces.find_rest(x)
+        load = surface.reaction_load(report.result.r_n, len(x), report.result.r_t)
+        sizes = [rest - load, step.b, step.internal, step.b - rest]
+        left, *forces = surface.comm.max(np.array([np.abs(f).max(initial=0.0) for f in sizes]))
+        assert report.certificate.equilibrium == pytest.approx(left / max(forces), rel=1e-6)
+
+
 @pytest.mark.serial
 def test_a_restart_is_the_straight_run(tmp_path: Any) -> None:
     from mpi4py import MPI

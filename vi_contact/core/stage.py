@@ -254,6 +254,11 @@ class NonlinearForces:
     system: SemiDiscreteSystem
     stage: Stage
 
+    @property
+    def turns(self) -> bool:
+        """Say whether the internal force is that of a body that turns."""
+        return self.stage.between is not None
+
     def find_rest(self, d: Array) -> Array:
         """Return what is left of the forces at an increment (n,): b - A d of a linear body."""
         return find_rest(self.system, self.stage, d)[0]

@@ -205,7 +205,7 @@ class NonlinearSolver:
             start = Place(d, forces.find_rest(d), step.active)
         walk = Walk(step, forces, start, start, self._reference, self._make_acceleration())
         # The reference of a body that has turned is of no use: its passes go with a tangent.
-        walk.tangent_due = forces.stage.between is not None
+        walk.tangent_due = forces.turns
         return walk
 
     def _go(self, walk: Walk, passes: Passes[Pass]) -> Iterator[Pass]:
@@ -346,8 +346,7 @@ class NonlinearSolver:
             walk: so far.
             passes: what they have shown.
         """
-        turning = walk.forces.stage.between is not None
-        if passes.rate == 1.0 or (turning and passes.rate < TURNED):
+        if passes.rate == 1.0 or (walk.forces.turns and passes.rate < TURNED):
             return False
         left = ln(passes.goal / passes.least) / ln(passes.rate)
         return left > self._cost + MARGIN
