@@ -136,7 +136,14 @@ def test_drag_slows_a_flight_down_by_its_own_rate(comm: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("width", "theta0", "off"), [(0.5, 0.1, 5e-4), (0.5, 0.3, 1e-3), (1.0, 0.5, 3e-4)]
+    ("width", "theta0", "off"),
+    [
+        (0.5, 0.1, 5e-4),
+        (0.5, 0.2, 1.2e-3),
+        (0.5, 0.3, 1e-3),
+        (1.0, 0.5, 3e-4),
+        (1.0, 0.7, 1e-3),
+    ],
 )
 def test_a_block_rocks_as_the_rigid_one(comm: Any, width: float, theta0: float, off: float) -> None:
     """Quarter periods. Energy is lost at landings alone, each time the work of the closing nodes:
