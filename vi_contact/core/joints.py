@@ -92,6 +92,7 @@ class JointStep:
         at_end: whether the strength is that at the end, and not the mean.
         used: the strength in newtons that the step is solved with; None before the first pass.
         speed: the slip rates (m,) [m/s] that mu is taken at, of laws that are solved for the rate.
+        water: forces (m,) [N] of water that is held fast while passes find the rest; else None.
     """
 
     law: Any
@@ -106,6 +107,7 @@ class JointStep:
     at_end: bool
     used: Strength | None = None
     speed: Array | None = None
+    water: Array | None = None
 
     @property
     def implicit(self) -> bool:
@@ -139,7 +141,8 @@ class JointStep:
             found = law.strength(there, g1, g1, s1, s1, self.dt)
         else:
             found = law.strength(self.committed, self.g0, g1, self.s0, s1, self.dt)
-        return self._weigh(found)
+        weighed = self._weigh(found)
+        return weighed if self.water is None else weighed._replace(water=self.water)
 
     def _weigh(self, found: Strength) -> Strength:
         """Return a strength in newtons, with a limit of friction that is never negative."""
@@ -425,7 +428,12 @@ def _weigh_prestress(law: Any, surface: ContactSurface, slip: Array) -> tuple[Ar
 
 
 def pose_joint(
-    problem: ContactProblem, state: State, dt: float, *, at_end: bool = False
+    problem: ContactProblem,
+    state: State,
+    dt: float,
+    *,
+    at_end: bool = False,
+    t: float | None = None,
 ) -> JointStep:
     """Return the joint at the beginning of a step.
 
@@ -434,9 +442,12 @@ def pose_joint(
         state: at the beginning.
         dt: length of the step [s], 0 for a static stage.
         at_end: whether the strength is that at the end.
+        t: time of the end [s], which water may depend on; None for dt after the state.
     """
     surface = problem.surface
     law: Any = problem.joint
+    if hasattr(law, "at_time"):
+        law = law.at_time(state.t + dt if t is None else t)
     committed = read_committed(problem, state)
     before = committed.get(RAISED, np.zeros(surface.count))
     raised = np.zeros(surface.count)
