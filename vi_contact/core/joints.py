@@ -36,6 +36,7 @@ from .surfaces import ContactSurface
 
 MEMORY = "joint_"  # how names of committed arrays begin in the memory of a state
 RAISED = "raised"  # the frame's own committed array: the dilation of the step before
+STICKS = 1.0 - 1e-6  # of the limit: a point that bears less did not slip
 TINY = 1e-10  # of the largest force of a step: below it no strength is judged
 ROUNDING = 1e-5  # of the displacements of a step: a slip that is judged is no smaller
 # Of what the largest load moves by itself: forces are certified relative to it, so a slip is known
@@ -87,7 +88,10 @@ class JointStep:
         s0: slips (m, d - 1) [m] at the beginning.
         raised: how far slip has lifted the points (m,) [m].
         lifted: by how much of it in this step (m,) [m].
+        prestress: forces [N] that the joint had before: normal (m,), tangential (m, d - 1).
         dt: length of the step [s], 0 for a static stage.
+        shear: tangential reactions (m, d - 1) [N] of the state at the beginning; None for none.
+        pressure: normal ones (m,) [N].
         at_end: whether the strength is that at the end, and not the mean.
         used: the strength in newtons that the step is solved with; None before the first pass.
         speed: the slip rates (m,) [m/s] that mu is taken at, of laws that are solved for the rate.
@@ -100,7 +104,10 @@ class JointStep:
     s0: Array
     raised: Array
     lifted: Array
+    prestress: tuple[Array, Array]
     dt: float
+    pressure: Array
+    shear: Array | None
     at_end: bool
     used: Strength | None = None
     speed: Array | None = None
@@ -123,6 +130,17 @@ class JointStep:
         there = base.bound - self.raised - self.surface.normal_values(base.guess)
         g1 = np.where(base.active | (self.g0 <= 0.0), self.g0, np.maximum(there, 0.0))
         return self.ask(g1, self.s0)
+
+    def find_sticking(self, used: Strength) -> Mask:
+        """Return which points (m,) bore less than their limit at the beginning.
+
+        Args:
+            used: the strength [N] there.
+        """
+        if self.shear is None:
+            return np.zeros(self.surface.count, dtype=bool)
+        limit = used.cohesion + used.mu * np.maximum(self.pressure - used.water, -used.tension)
+        return np.asarray(np.linalg.norm(self.shear, axis=1) < STICKS * limit)
 
     def ask(self, g1: Array, s1: Array) -> Strength:
         """Return the strength [N] of a step that ends at these openings and slips.
@@ -182,20 +200,6 @@ class JointStep:
         there = law.commit(self.committed, self.g0, g1, self.s0, s1, self.dt)
         slope = law.slope(there, g1, g1, s1, s1, self.dt)
         return Slope(2.0 * weights * slope.tension, 2.0 * np.asarray(slope.mu, dtype=float))
-
-    @property
-    def prestress(self) -> tuple[Array, Array]:
-        """Return the forces [N] that the joint had before: normal (m,), tangential (m, d - 1)."""
-        normal = np.zeros(self.surface.count)
-        shear = np.zeros(self.s0.shape)
-        before = getattr(self.law, "prestress", None)
-        if before is not None:
-            count = self.surface.count
-            weights = self.surface.weights
-            normal = weights * before.spread("normal", count)
-            if shear.shape[1]:
-                shear[:, 0] = weights * before.spread("shear", count)
-        return normal, shear
 
     @property
     def pull(self) -> Array:
@@ -454,6 +458,21 @@ def pose_joint(
         s0=surface.slip(state.u, state.t),
         raised=raised,
         lifted=raised - before,
+        prestress=_weigh_prestress(law, surface),
         dt=dt,
+        pressure=state.r_n,
+        shear=state.r_t,
         at_end=at_end,
     )
+
+
+def _weigh_prestress(law: Any, surface: ContactSurface) -> tuple[Array, Array]:
+    """Return the forces [N] that a joint had before: normal (m,), tangential (m, d - 1)."""
+    normal = np.zeros(surface.count)
+    shear = np.zeros(surface.tangents.shape)
+    before = getattr(law, "prestress", None)
+    if before is not None:
+        normal = surface.weights * before.spread("normal", surface.count)
+        if shear.shape[1]:
+            shear[:, 0] = surface.weights * before.spread("shear", surface.count)
+    return normal, shear
