@@ -202,7 +202,7 @@ def measure_rupture(cells: int, steps: int) -> dict[str, float]:
     surface = problem.surface
     way = surface.everywhere(stepper.state.memory["joint_way"])
     return {
-        "unknowns": float(problem.equations.algebra.size),
+        "unknowns": float(COMM.allreduce(problem.equations.rows)),
         "points": float(surface.total),
         "steps": float(steps),
         "passes_mean": float(np.mean(stepper.joints[dt].passes)),
