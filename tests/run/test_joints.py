@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from joint_cases import CRITICAL, MASS, PRESSURE, STRENGTH, slider, strip, torn_mass
+from joint_cases import CRITICAL, MASS, PRESSURE, SLIDER, STRENGTH, slider, strip, torn_mass
 from marched_chain import difference
 
 import vi_contact as vc
@@ -266,6 +266,75 @@ def test_stick_slip_with_steps_chosen_from_the_speed() -> None:
     starts = np.array(times)[np.flatnonzero(fast[1:] & ~fast[:-1])]
     assert np.diff(starts)[-1] == pytest.approx(0.62649, rel=0.05)
     assert max(speeds) == pytest.approx(0.2725, rel=1e-2)
+
+
+def test_stick_slip_in_one_run_by_slip_rate(tmp_path: Path) -> None:
+    """Steps by the slip rate have the period of an independent program, of the cycle, to the 0.34 %
+    that the second period from steady slip is shorter (the fifth is right to 6e-4); none slips
+    further than it may, all end on base steps, and a restart is the straight run."""
+    problem, start = slider(0.4 * CRITICAL, 1e-3, 0.9e-3, "aging")
+    reach = 0.25 * SLIDER["dc"]
+    plan = vc.BySlipRate(2e-3, reach, halvings=7)
+    steps = march(problem, plan, 2.4, state=start)
+    t = np.array([0.0] + [state.t for state, _ in steps])
+    V = np.array([state.memory["joint_speed"][0] for state, _ in steps])
+    fast = t[2:][(V[:-1] < 0.1) & (V[1:] >= 0.1)]
+    assert np.diff(fast)[-1] == pytest.approx(0.62649, rel=1e-2)
+    dt = np.diff(t)
+    assert np.all((V * dt <= 2.0 * reach * (1.0 + 1e-9)) | (dt < 1.001 * 2e-3 / 2**7))
+    assert t[-1] == pytest.approx(2.4, rel=1e-12) and dt.min() < 0.1 * dt.max()
+
+    def run(t_end: float, out: Path | None, **others: Any) -> vc.State:
+        settings: dict[str, Any] = {"scheme": HALF, "solver": vc.Condensed(), "progress": False}
+        return vc.simulate(problem, dt=plan, t_end=t_end, out=out, **settings, **others).state
+
+    run(0.6, tmp_path, state=start)
+    again = run(0.64, tmp_path, restart=True)
+    straight = run(0.64, None, state=start)
+    assert difference(again, straight) == 0.0
+
+
+def test_a_forced_point_weakens_in_time() -> None:
+    """A block that bears 0.5 N on 0.6 is forced down to 0.3 within t0: it slides from T + t0/3, has
+    v = N t0/(15 m) at T + t0 and gains 0.2 N/m a second after: exact, as the mean in time is."""
+    T, ramp = 0.01, 0.03
+    system = vc.system_from_arrays(
+        np.array([MASS, MASS]), None, np.diag([1e-3, 1e12]), coordinates=[[0.0, 0.0]]
+    ).with_load((np.array([0.5 * PRESSURE, -PRESSURE]), lambda t: 1.0))
+    surface = vc.contact_points(system, [0], [[0.0, -1.0]])
+    law = laws.SlipWeakening(static=0.6, kinetic=0.3, distance=1e9, forced=T, ramp=ramp)
+    problem = vc.ContactProblem(system, surface, joint=law, mass=vc.ConsistentMass())
+    rest = vc.State(
+        t=0.0,
+        k=0,
+        u=np.zeros(2),
+        v=np.zeros(2),
+        r_n=np.array([PRESSURE]),
+        active=np.ones(1, dtype=bool),
+        r_t=surface.in_frames(np.array([0.5 * PRESSURE, 0.0]))[surface.tangents],
+    )
+    exact = PRESSURE * ramp / (15.0 * MASS)
+    for dt in (4e-3, 1e-3):
+        last, _ = march(problem, dt, 0.06, state=rest)[-1]
+        speed = abs(float(problem.cartesian(last.v)[0]))
+        grows = (last.t - T - ramp) * 0.2 * PRESSURE / MASS
+        assert speed == pytest.approx(exact + grows, rel=1e-8)
+    assert last.memory["joint_clock"][0] == pytest.approx(0.06, rel=1e-12)
+    whole = laws.SlipWeakening(static=0.6, kinetic=0.3, distance=1e9)
+    assert "clock" not in whole.start(1)
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"slip": 0.0}, "give the longest slip of a step in metres"),
+        ({"halvings": 0}, "give a whole number from 1 to 20"),
+        ({"dt": -1.0}, "give a positive time step"),
+    ],
+)
+def test_bad_plans_by_slip_rate_are_refused(values: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        vc.BySlipRate(**({"dt": 1e-3, "slip": 1e-6} | values))
 
 
 def test_a_wrong_slip_rate_is_caught() -> None:
