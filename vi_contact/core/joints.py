@@ -428,6 +428,18 @@ def find_limit(problem: ContactProblem, state: State) -> Array:
     return np.asarray(cohesion + left.mu * np.maximum(effective, 0.0))
 
 
+def _weigh_prestress(law: Any, surface: ContactSurface, slip: Array) -> tuple[Array, Array]:
+    """Return the forces [N] of a law's prestress: normal (m,), tangential (m, d - 1) as slips."""
+    normal = np.zeros(surface.count)
+    shear = np.zeros(slip.shape)
+    before = getattr(law, "prestress", None)
+    if before is not None:
+        normal = surface.weights * before.spread("normal", surface.count)
+        if shear.shape[1]:
+            shear[:, 0] = surface.weights * before.spread("shear", surface.count)
+    return normal, shear
+
+
 def pose_joint(
     problem: ContactProblem, state: State, dt: float, *, at_end: bool = False
 ) -> JointStep:
@@ -450,29 +462,18 @@ def pose_joint(
     gap = surface.gap(state.t) - surface.normal_values(state.u) - before
     gap = gap + surface.compliance * state.r_n
     g0 = np.where(state.active, 0.0, np.maximum(gap, 0.0))
+    s0 = surface.slip(state.u, state.t)
     return JointStep(
         law=law,
         committed={name: values for name, values in committed.items() if name != RAISED},
         surface=surface,
         g0=g0,
-        s0=surface.slip(state.u, state.t),
+        s0=s0,
         raised=raised,
         lifted=raised - before,
-        prestress=_weigh_prestress(law, surface),
+        prestress=_weigh_prestress(law, surface, s0),
         dt=dt,
         pressure=state.r_n,
         shear=state.r_t,
         at_end=at_end,
     )
-
-
-def _weigh_prestress(law: Any, surface: ContactSurface) -> tuple[Array, Array]:
-    """Return the forces [N] that a joint had before: normal (m,), tangential (m, d - 1)."""
-    normal = np.zeros(surface.count)
-    shear = np.zeros(surface.tangents.shape)
-    before = getattr(law, "prestress", None)
-    if before is not None:
-        normal = surface.weights * before.spread("normal", surface.count)
-        if shear.shape[1]:
-            shear[:, 0] = surface.weights * before.spread("shear", surface.count)
-    return normal, shear
