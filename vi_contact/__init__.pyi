@@ -56,6 +56,7 @@ from .practice import studies as studies
 from .practice.ground_motion import GroundMotion as GroundMotion
 from .practice.ground_motion import read_record as read_record
 from .run import BodyMotion as BodyMotion
+from .run import BySlipRate as BySlipRate
 from .run import Contact as Contact
 from .run import CrossChecked as CrossChecked
 from .run import Energy as Energy

@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fault import DISTANCE, HALF, KINETIC, SIGMA, fault
+from fault import DISTANCE, HALF, KINETIC, NU, SHEAR, SIGMA, fault
 from mpi4py import MPI
 
 import vi_contact as vc
 from vi_contact import fem, laws
 from vi_contact.core.errors import InputError
 from vi_contact.meshes import BlockMesh
+from vi_contact.run.joint_elements import joint_warning
 
 MIDPOINT = vc.ZienkiewiczWoodTaylor()
 STONE = vc.LinearElastic(E=2e10, nu=0.2, rho=2400.0)
@@ -95,6 +96,22 @@ def test_the_base_of_a_block_cracks(solver: str) -> None:
     opened = surface.everywhere(run.state.memory["joint_opened"])
     taken = np.sum(weights * 0.5 * 2e5 * np.minimum(opened, 1e-4))
     assert run.history["loss_fracture"][-1] == pytest.approx(taken, rel=0.05)
+
+
+def test_elements_that_are_too_long_for_the_joint_are_told(comm: Any) -> None:
+    """E dc/(4 f_t) is 2.5 m and 0.5 m, and elements are 4/3 m; of the fault, a third of
+    mu* dc/(sigma (mu_s - mu_d)) is 390 m, and its barriers, which hold, are left out."""
+    assert joint_warning(block(comm, BASE)) is None
+    said = joint_warning(block(comm, replace(BASE, opening=2e-5)))
+    assert said is not None
+    assert "elements of 1.33 m at the joint are longer than E G_f/(2 f_t²) = 0.5 m" in said
+    assert joint_warning(block(comm, laws.Joint(tension=1e5, cohesion=1e5, energy=1.0))) is not None
+    assert joint_warning(block(comm, replace(BASE, opening=None, softening="brittle"))) is None
+    said = joint_warning(fault(comm, 500.0))
+    assert said is not None
+    shear = SHEAR / (1.0 - NU)
+    assert f"= {shear * DISTANCE / (3.0 * SIGMA * (0.677 - KINETIC)):.3g} m" in said
+    assert joint_warning(fault(comm, 250.0)) is None
 
 
 @pytest.mark.parametrize("solver", SOLVERS)

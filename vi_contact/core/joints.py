@@ -36,6 +36,7 @@ from .surfaces import ContactSurface
 
 MEMORY = "joint_"  # how names of committed arrays begin in the memory of a state
 RAISED = "raised"  # the frame's own committed array: the dilation of the step before
+STICKS = 1.0 - 1e-6  # of the limit: a point that bears less did not slip
 TINY = 1e-10  # of the largest force of a step: below it no strength is judged
 ROUNDING = 1e-5  # of the displacements of a step: a slip that is judged is no smaller
 # Of what the largest load moves by itself: forces are certified relative to it, so a slip is known
@@ -89,6 +90,8 @@ class JointStep:
         lifted: by how much of it in this step (m,) [m].
         prestress: forces [N] that the joint had before: normal (m,), tangential (m, d - 1).
         dt: length of the step [s], 0 for a static stage.
+        shear: tangential reactions (m, d - 1) [N] of the state at the beginning; None for none.
+        pressure: normal ones (m,) [N].
         at_end: whether the strength is that at the end, and not the mean.
         used: the strength in newtons that the step is solved with; None before the first pass.
         speed: the slip rates (m,) [m/s] that mu is taken at, of laws that are solved for the rate.
@@ -104,6 +107,8 @@ class JointStep:
     lifted: Array
     prestress: tuple[Array, Array]
     dt: float
+    pressure: Array
+    shear: Array | None
     at_end: bool
     used: Strength | None = None
     speed: Array | None = None
@@ -127,6 +132,17 @@ class JointStep:
         there = base.bound - self.raised - self.surface.normal_values(base.guess)
         g1 = np.where(base.active | (self.g0 <= 0.0), self.g0, np.maximum(there, 0.0))
         return self.ask(g1, self.s0)
+
+    def find_sticking(self, used: Strength) -> Mask:
+        """Return which points (m,) bore less than their limit at the beginning.
+
+        Args:
+            used: the strength [N] there.
+        """
+        if self.shear is None:
+            return np.zeros(self.surface.count, dtype=bool)
+        limit = used.cohesion + used.mu * np.maximum(self.pressure - used.water, -used.tension)
+        return np.asarray(np.linalg.norm(self.shear, axis=1) < STICKS * limit)
 
     def ask(self, g1: Array, s1: Array) -> Strength:
         """Return the strength [N] of a step that ends at these openings and slips.
@@ -468,5 +484,7 @@ def pose_joint(
         lifted=raised - before,
         prestress=_weigh_prestress(law, surface, s0),
         dt=dt,
+        pressure=state.r_n,
+        shear=state.r_t,
         at_end=at_end,
     )

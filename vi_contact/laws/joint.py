@@ -18,7 +18,7 @@ P.-E. Petersson, Cem. Concr. Res. 6 (1976) 773-782 (linear); D. S. Dugdale, J. M
 import math
 from copy import copy
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -40,6 +40,24 @@ from .joint_water import JointWater, PlacedWater
 
 SHORT = 1e-6  # of dc: over a shorter way the slope of the mean is half that of the law
 ROUNDING = 1e-9  # relative: a cohesion that is mu times the tensile strength but for rounding
+
+
+class _Walk(NamedTuple):
+    """Hold what is left of a strength along the way of a step, each (m,).
+
+    Attributes:
+        dc: at which nothing is left [m].
+        last: kappa at the end [m].
+        secant: D over the largest opening before [1/m], of the way below it.
+        on_law: the mean of D beyond it.
+        whole: the mean of D between both ends.
+    """
+
+    dc: Array
+    last: Array
+    secant: Array
+    on_law: Array
+    whole: Array
 
 
 @dataclass(frozen=True)
@@ -200,16 +218,33 @@ class Joint(OfPoints):
         if self.softening == "brittle":
             return self._left(last, dc)
         way = last - first
+        if not way.any():
+            return self._left(first, dc)
         if self.softening == "linear":
             return take_mean_of_line(first, way, dc)
         # Of constant strength the mean is the part of the way that lies below dc.
         below = np.minimum(last, dc) - np.minimum(first, dc)
         return np.divide(below, way, out=self._left(first, dc), where=way > 0.0)
 
-    def _walk(
-        self, committed: Committed, g1: Array, s1: Array
-    ) -> tuple[Array, Array, Array, Array]:
-        """Return dc, kappa at the largest opening before and at the end, and D/opened on the way.
+    def _reach(self, committed: Committed, g1: Array, s1: Array) -> tuple[Array, Array]:
+        """Return kappa (m,) [m] where a step comes back to the largest opening, and at its end.
+
+        Args:
+            committed: before the step.
+            g1: openings (m,) [m] at its end.
+            s1: slips (m, d - 1) [m] at its end.
+        """
+        turn = np.minimum(g1, committed["opened"])
+        last = g1
+        if s1.shape[1]:
+            slip = self._find_beta(len(g1)) * measure_length(s1)
+            turn = np.hypot(turn, slip)
+            last = np.hypot(last, slip)
+        turn = np.maximum(committed["kappa"], turn)
+        return turn, np.maximum(turn, last)
+
+    def _walk(self, committed: Committed, g1: Array, s1: Array) -> _Walk:
+        """Return how much of the strength is left along the way of a step.
 
         Args:
             committed: before the step.
@@ -218,14 +253,38 @@ class Joint(OfPoints):
         """
         count = len(g1)
         dc = self._find_reach(count)
-        slip = self._find_beta(count) * measure_length(s1)
         kappa = committed["kappa"]
         opened = committed["opened"]
-        turn = np.maximum(kappa, np.hypot(np.minimum(g1, opened), slip))
-        last = np.maximum(turn, np.hypot(g1, slip))
-        mean = self._mean_left(kappa, turn, dc)
-        secant = np.divide(mean, opened, out=np.zeros(count), where=opened > 0.0)
-        return dc, turn, last, secant
+        turn, last = self._reach(committed, g1, s1)
+        on_law = self._mean_left(turn, last, dc)
+        if np.array_equal(turn, kappa):  # nothing is lost on the way back: the usual case
+            before, whole = self._left(kappa, dc), on_law
+        else:
+            before = self._mean_left(kappa, turn, dc)
+            whole = self._mean_left(kappa, last, dc)
+        secant = np.divide(before, opened, out=np.zeros(count), where=opened > 0.0)
+        return _Walk(dc, last, secant, on_law, whole)
+
+    def _find_mean(self, committed: Committed, g0: Array, g1: Array, walk: _Walk) -> Array:
+        """Return the mean of the tension over a step (m,), of the tensile strength.
+
+        Along the secant up to the largest opening before, then along the law.
+
+        Args:
+            committed: before the step.
+            g0: openings (m,) [m] at its beginning.
+            g1: openings at its end.
+            walk: between them.
+        """
+        opened = committed["opened"]
+        secant = walk.secant
+        way = g1 - g0
+        beyond = g1 > opened
+        back = 0.5 * secant * (opened - g0) * (opened + g0)
+        work = back + walk.on_law * (g1 - opened)
+        mean = np.divide(work, way, out=walk.on_law.copy(), where=beyond & (way > 0.0))
+        mean = np.where(beyond & (g0 == opened), walk.on_law, mean)
+        return np.where(beyond | (opened == 0.0), mean, 0.5 * secant * (g0 + g1))
 
     def strength(
         self, committed: Committed, g0: Array, g1: Array, s0: Array, s1: Array, dt: float
@@ -241,24 +300,11 @@ class Joint(OfPoints):
             dt: its length [s]; read by water alone.
         """
         count = len(g1)
-        dc, turn, last, secant = self._walk(committed, g1, s1)
-        opened = committed["opened"]
-
-        # Along the secant up to the largest opening before, then along the law.
-        on_law = self._mean_left(turn, last, dc)
-        beyond = g1 > opened
-        back = 0.5 * secant * (opened - g0) * (opened + g0)
-        way = g1 - g0
-        mean = np.divide(
-            back + on_law * (g1 - opened), way, out=on_law.copy(), where=beyond & (way > 0.0)
-        )
-        mean = np.where(beyond & (g0 == opened), on_law, mean)
-        mean = np.where(beyond | (opened == 0.0), mean, 0.5 * secant * (g0 + g1))
-
-        tension = self.spread("tension", count) * mean
+        walk = self._walk(committed, g1, s1)
+        tension = self.spread("tension", count) * self._find_mean(committed, g0, g1, walk)
         cohesion = self.spread("cohesion", count)
         if not _is_zero(self.cohesion):
-            cohesion = cohesion * self._mean_left(committed["kappa"], last, dc)
+            cohesion = cohesion * walk.whole
         if isinstance(self.water, PlacedWater):
             water = self.water.find_in_step(committed, g0, dt)
         else:
@@ -281,9 +327,10 @@ class Joint(OfPoints):
             dt: its length [s].
         """
         count = len(g1)
-        dc, _, last, secant = self._walk(committed, g1, s1)
+        walk = self._walk(committed, g1, s1)
+        dc, last = walk.dc, walk.last
         tension = self.spread("tension", count)
-        mean = self.strength(committed, g0, g1, s0, s1, dt).tension
+        mean = tension * self._find_mean(committed, g0, g1, walk)
         way = g1 - g0
         is_long = way > SHORT * dc
         change = tension * self._left(last, dc) - mean
@@ -293,7 +340,7 @@ class Joint(OfPoints):
             of_mean = np.where(is_long, of_mean, at_once)
         opened = committed["opened"]
         on_secant = (g1 < opened) | ((g1 == opened) & (g0 < opened))
-        return Slope(np.where(on_secant, 0.5 * tension * secant, of_mean), np.zeros(count))
+        return Slope(np.where(on_secant, 0.5 * tension * walk.secant, of_mean), np.zeros(count))
 
     def commit(
         self, committed: Committed, g0: Array, g1: Array, s0: Array, s1: Array, dt: float
@@ -308,7 +355,7 @@ class Joint(OfPoints):
             s1: slips at its end.
             dt: its length [s]; read by water alone.
         """
-        _, _, last, _ = self._walk(committed, g1, s1)
+        last = self._reach(committed, g1, s1)[1]
         after = {
             "kappa": last,
             "opened": np.maximum(committed["opened"], g1),

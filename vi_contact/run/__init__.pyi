@@ -32,6 +32,7 @@ from .solution import Solution as Solution
 from .static import quasi_static as quasi_static
 from .static import static_equilibrium as static_equilibrium
 from .stepper import Stepper as Stepper
+from .time_steps import BySlipRate as BySlipRate
 from .time_steps import ErrorControlled as ErrorControlled
 from .time_steps import HalvedAtImpact as HalvedAtImpact
 from .time_steps import Schedule as Schedule

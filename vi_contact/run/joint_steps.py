@@ -28,12 +28,22 @@ def refuse_scheme(problem: ContactProblem, scheme: Any) -> None:
         return
     if not getattr(scheme, "takes_joints", False):
         raise InputError(
-            f"{type(scheme).__name__} does not take a joint, whose strength is a mean over the "
-            "step as the reactions of ZienkiewiczWoodTaylor, Midpoint and SS22 are: give one of "
-            "these, or no scheme"
+            f"{type(scheme).__name__} does not take a joint: {_say_why(scheme)}; give Midpoint(), "
+            "ZienkiewiczWoodTaylor(), SS22(), EnergyMomentum() or ContactStabilisedNewmark(), or "
+            "no scheme"
         )
     if problem.system.internal is not None:
         raise InputError(NO_JOINT)
+
+
+def _say_why(scheme: Any) -> str:
+    """Return why the energy of a joint would not be that under its law with a scheme."""
+    if getattr(scheme, "penetrates", False):
+        return "its contact is between velocities, and a joint is lost by its opening"
+    return (
+        "its reactions are those at one time, so that their work is not the area under the law, "
+        "whose strength is a mean over the step"
+    )
 
 
 def refuse_statics(problem: ContactProblem) -> None:

@@ -1,8 +1,8 @@
 """March: the one time loop, a generator over certified steps.
 
-A *base step* is one of the plan (``time_steps``). ``HalvedAtImpact`` and ``ErrorControlled`` may
-make it in halves, which are certified steps like any other. Each is an attempt of a ``Stepper``,
-which is accepted or made again in halves.
+A *base step* is one of the plan (``time_steps``). ``HalvedAtImpact``, ``ErrorControlled`` and
+``BySlipRate`` may make it in halves, which are certified steps like any other. Each is an attempt
+of a ``Stepper``, which is accepted or made again in halves.
 """
 
 from collections.abc import Iterator, Sequence
@@ -12,6 +12,7 @@ import numpy as np
 from ..core.algebra import max_abs
 from ..core.collective import together
 from ..core.errors import StepFailure
+from ..core.joints import read_committed
 from ..core.problem import ContactProblem
 from ..core.state_checks import initial_state
 from ..core.step import Report, Scheme, Solver, State
@@ -40,7 +41,7 @@ def march(
             ``run.method.with_defaults`` chooses them, and ``report.problem`` has them.
         scheme: the time scheme.
         solver: of the steps; None means Automatic().
-        dt: constant [s], or a Schedule, HalvedAtImpact or ErrorControlled.
+        dt: constant [s], or a Schedule, HalvedAtImpact, ErrorControlled or BySlipRate.
         steps: the number of base steps. The halves of a halved step are yielded one by one, and
             ``state.k`` counts them, but they are one of the ``steps``.
         t_end: the time [s] at which the base steps end; give it or ``steps``.
@@ -118,10 +119,12 @@ class March(Stepper):
             self.state = self._convert_state(dt)
             self.dt = dt
 
-            if self.step_plan.error is None:
-                reports = self._halve_at_impact(sizes)
-            else:
+            if self.step_plan.error is not None:
                 reports = self._halve_by_error(sizes)
+            elif self.step_plan.slip is not None:
+                reports = self._halve_by_slip(sizes, self.step_plan.slip)
+            else:
+                reports = self._halve_at_impact(sizes)
             for report, size, ended in reports:
                 self.state = report.new
                 self.dt = size
@@ -175,6 +178,50 @@ class March(Stepper):
             if first is not None:
                 yield first, sizes[level + 1], False
             yield second, sizes[level + 1], not parts
+
+    def _halve_by_slip(
+        self, sizes: list[float], slip: float
+    ) -> Iterator[tuple[Report, float, bool]]:
+        """Yield the parts of a base step as ``_halve_at_impact`` does, by the slip rate.
+
+        Args:
+            sizes: lengths of its parts by how often they were halved [s].
+            slip: the longest of a part [m].
+        """
+        levels = [0]
+        while levels:
+            level = levels.pop()
+            may_halve = level < self.step_plan.halvings
+            if may_halve and self._find_slip_rate(self.state) * sizes[level] > slip:
+                levels += [level + 1, level + 1]
+                continue
+            report = self._attempt_or_none(sizes[level]) if may_halve else None
+            if may_halve and self._slips_far(report, sizes[level], slip):
+                self.halved += 1
+                levels += [level + 1, level + 1]
+                continue
+            report = report or self._attempt(sizes[level])
+            yield report, sizes[level], not levels
+
+    def _slips_far(self, report: Report | None, dt: float, slip: float) -> bool:
+        """Tell whether a step has no answer, or ends with a rate that needed shorter ones.
+
+        Args:
+            report: of the step; None where no solver can do it.
+            dt: its length [s].
+            slip: the longest of a part [m].
+        """
+        return report is None or self._find_slip_rate(report.new) * dt > 2.0 * slip
+
+    def _find_slip_rate(self, state: State) -> float:
+        """Return the largest slip rate [m/s] of all contact points. Collective."""
+        problem = self.method.problem
+        surface = problem.surface
+        rates = np.linalg.norm(surface.tangential_values(state.v), axis=1)
+        if problem.joint is not None:
+            # Of a law of rates it is that of the last step, without the ringing of velocities.
+            rates = read_committed(problem, state).get("speed", rates)
+        return float(surface.comm.max(np.array([max_abs(rates)]))[0])
 
     def _attempt_or_none(self, dt: float) -> Report | None:
         """Return a step of dt [s] from the state; None where no solver can do it."""

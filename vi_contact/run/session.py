@@ -36,6 +36,7 @@ from .files.identity import identify
 from .files.log import Progress, list_versions
 from .files.table import Table
 from .files.writer import Writer
+from .joint_elements import joint_warning
 from .march import March
 from .memory import describe_memory, measure_memory
 from .method import Method
@@ -79,6 +80,7 @@ class Session:
         memory: bytes of this process and of the large matrices, by name.
         halved: attempts that were thrown away.
         seconds: of the last ``TIMED`` steps [s].
+        of_joint: a warning where elements at a joint are too long, "" where they are not.
     """
 
     request: RunRequest
@@ -96,6 +98,7 @@ class Session:
     memory: Mapping[str, Any] = field(default_factory=dict)
     halved: int = 0
     seconds: deque[float] = field(default_factory=lambda: deque(maxlen=TIMED))
+    of_joint: str = ""
 
     @property
     def root(self) -> bool:
@@ -126,6 +129,7 @@ class Session:
             "boundaries": list(problem.system.notes),
             "damping": describe_damping(problem, unknown=NOT_COMPUTED),
             "sampling": sampling_warning(problem, max(list_pieces(method.dt))[0]) or "",
+            "joint_elements": self.of_joint,
         }
 
     @property
@@ -368,7 +372,8 @@ class Session:
         writer.rescue(facts)
 
     def _tell_start(self) -> None:
-        """Write into the log what is run, on rank 0."""
+        """Write into the log what is run, on rank 0. Collective."""
+        self.of_joint = joint_warning(self.method.problem) or ""
         if not self.root:
             return
         log.info(
@@ -376,7 +381,7 @@ class Session:
             ", ".join(f"{name} {version}" for name, version in list_versions().items()),
         )
         for name, value in self.settings().items():
-            if name != "sampling":
+            if name not in ("sampling", "joint_elements"):
                 log.info("%s: %s", name, value)
             elif value:
                 log.warning("%s", value)

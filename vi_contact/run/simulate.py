@@ -83,8 +83,8 @@ def simulate(
             Zienkiewicz-Wood-Taylor step. A problem that names no mass matrix gets the one of the
             scheme (``run.method.with_defaults``).
         solver: None means Automatic().
-        dt: time step [s], or a plan: Schedule, HalvedAtImpact, ErrorControlled. ``steps``, t_end
-            and checkpoint_every count base steps.
+        dt: time step [s], or a plan: Schedule, HalvedAtImpact, ErrorControlled, BySlipRate.
+            ``steps``, t_end and checkpoint_every count base steps.
         t_end: the time [s] until which is marched; give it or ``steps``.
         steps: the number of base steps.
         record: recorders; None means Energy(), Contact() and, with a joint, JointEnergy(). Time,

@@ -234,7 +234,8 @@ def _list_entries(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
             if name in facts["energy"] and name != "energy_defect":
                 entries.append((f"  {title}", f"{facts['energy'][name]: .6e}"))
     entries += _fill_in(DEFECT, words)
-    for warning in filter(None, (energy_warning(facts), facts.get("sampling"))):
+    told = (energy_warning(facts), facts.get("sampling"), facts.get("joint_elements"))
+    for warning in filter(None, told):
         text = f"WARNING: {warning}"
         for line in wrap(text, 110, initial_indent="  ", subsequent_indent="  "):
             entries.append(("", line))

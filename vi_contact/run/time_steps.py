@@ -1,7 +1,7 @@
 """Plan how long the steps of a run are.
 
-This is a constant dt [s], a ``Schedule``, or steps halved where contact closes or where their
-error is too large.
+This is a constant dt [s], a ``Schedule``, or steps halved where contact closes, where their error
+is too large, or where points slip too far.
 
 Changing dt changes neither u nor v, and so no energy. A scheme that carries its past restarts it
 from them (``start``). ``steps``, ``t_end``, ``checkpoint_every`` and progress count *base steps*:
@@ -124,12 +124,48 @@ class ErrorControlled:
         object.__setattr__(self, "relative", _read(number, self.relative, remedy, positive=True))
 
 
-TimeSteps = float | Schedule | HalvedAtImpact | ErrorControlled
+@dataclass(frozen=True)
+class BySlipRate:
+    """Plan steps of ``dt`` [s], or of a Schedule, in which no point slips more than ``slip`` [m].
+
+    Before a step the largest slip rate V of all contact points is read. While V times its length is
+    above ``slip`` the step is cut into halves, down to dt/2**halvings. A step at whose end V times
+    its length is above twice ``slip`` is thrown away, and its halves are made. So a fault that
+    creeps for years and slips within seconds goes in one run. With ``RateAndState`` a quarter of dc
+    is a good slip: the period of stick-slip is then right to a thousandth. At most one matrix is
+    factorised for each of the halvings + 1 lengths of a piece.
+
+    Raises:
+        InputError: dt or slip is not positive, or halvings is not a whole number from 1 to 20.
+    """
+
+    dt: Annotated[float | Schedule, Unit("s")]
+    slip: Annotated[float, Unit("m")]
+    halvings: int = 10
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.dt, Schedule):
+            object.__setattr__(self, "dt", _read_dt(self.dt))
+        remedy = (
+            f"BySlipRate slip is {quote(self.slip)}: give the longest slip of a step in metres, "
+            "such as a quarter of dc"
+        )
+        object.__setattr__(self, "slip", _read(number, self.slip, remedy, positive=True))
+        remedy = (
+            f"BySlipRate halvings is {quote(self.halvings)}: give a whole number from 1 to "
+            f"{HALVINGS}"
+        )
+        halvings = _read(whole, self.halvings, remedy, least=1, most=HALVINGS)
+        object.__setattr__(self, "halvings", halvings)
+
+
+Halved = HalvedAtImpact | ErrorControlled | BySlipRate  # plans that a run refines while it goes
+TimeSteps = float | Schedule | Halved
 
 
 def describe_plan(plan: TimeSteps) -> float | str:
     """Return, for checkpoint and summary, a constant dt as the number it is, a plan in words."""
-    if isinstance(plan, Schedule | HalvedAtImpact | ErrorControlled):
+    if isinstance(plan, Schedule | Halved):
         return repr(plan)
     return plan
 
@@ -140,7 +176,7 @@ def list_pieces(plan: TimeSteps) -> tuple[tuple[float, float], ...]:
     Raises:
         InputError: there is no dt.
     """
-    dt = plan.dt if isinstance(plan, HalvedAtImpact | ErrorControlled) else plan
+    dt = plan.dt if isinstance(plan, Halved) else plan
     return dt.pieces if isinstance(dt, Schedule) else ((_read_dt(dt), inf),)
 
 
@@ -148,13 +184,14 @@ def list_pieces(plan: TimeSteps) -> tuple[tuple[float, float], ...]:
 class StepPlan:
     """Hold the base steps of one run.
 
-    These are parts (dt, number of steps), how often each may be halved, and the error above which
-    it is; without an error, it is halved where contact closes.
+    These are parts (dt, number of steps), how often each may be halved, and the error or the slip
+    [m] above which it is; without both, it is halved where contact closes.
     """
 
     parts: tuple[tuple[float, int], ...]
     halvings: int = 0
     error: float | None = None
+    slip: float | None = None
 
     @cached_property
     def steps(self) -> int:
@@ -194,8 +231,9 @@ def plan_steps(
     Raises:
         InputError: plan, steps or t_end make no sense, or there are more than 1e9 steps.
     """
-    halvings = plan.halvings if isinstance(plan, HalvedAtImpact | ErrorControlled) else 0
+    halvings = plan.halvings if isinstance(plan, Halved) else 0
     error = plan.relative if isinstance(plan, ErrorControlled) else None
+    slip = plan.slip if isinstance(plan, BySlipRate) else None
     pieces = list_pieces(plan)
     left = _limit_steps(steps, t_end, t0)
     parts: list[tuple[float, int]] = []
@@ -217,7 +255,7 @@ def plan_steps(
             parts.append((size, count))
         left = 0 if last else left - count
         if left == 0:
-            return StepPlan(tuple(parts), halvings, error)
+            return StepPlan(tuple(parts), halvings, error, slip)
         # The next piece begins where the plan says, or where the last step went beyond that.
         t += count * size
         if abs(t - until) <= SLACK * size:
@@ -260,7 +298,7 @@ def _limit_steps(steps: int | None, t_end: float | None, t0: float) -> float:
 
 def _read_dt(dt: Any) -> float:
     """Return a time step [s] as a float; InputError for what is none."""
-    plans = "a Schedule, HalvedAtImpact or ErrorControlled"
+    plans = "a Schedule, HalvedAtImpact, ErrorControlled or BySlipRate"
     remedy = f"dt is {quote(dt)}: give a positive time step in seconds, {plans}"
     size = float(_read(number, dt, remedy, positive=True))
     if not 1.0 / LONGEST < size < LONGEST:

@@ -27,6 +27,7 @@ Ortiz and Marsden, Comput. Methods Appl. Mech. Engng 180 (1999) 1-26.
 """
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -52,6 +53,8 @@ class ContactStabilisedNewmark(SingleStep):
     Attributes:
         projected: whether the predictor is projected.
     """
+
+    takes_joints: ClassVar[bool] = True
 
     projected: bool = True
 

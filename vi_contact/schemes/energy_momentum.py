@@ -37,6 +37,7 @@ class EnergyMomentum(SingleStep):
     """
 
     for_turning: ClassVar[bool] = True
+    takes_joints: ClassVar[bool] = True
 
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError for massless unknowns, and an internal force of one end alone."""

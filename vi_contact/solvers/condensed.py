@@ -252,6 +252,7 @@ class PreparedCondensed:
                 friction.delassus,
                 compliance,
                 surface,
+                self._rigid,
                 f"condensed {type(self._settings.friction_method).__name__}",
             )
         condensed, small = self._condense_normal()
@@ -267,7 +268,7 @@ class PreparedCondensed:
             closed = answer.active
             return answer.r[:, None], moved, closed, closed, held, bound, answer.iterations
 
-        return CondensedPasses(condensed, press, G, springs, surface, self._name)
+        return CondensedPasses(condensed, press, G, springs, surface, self._rigid, self._name)
 
     def solve_many(self, many: StepProblem, own: Callable[[int], StepProblem]) -> Answers | None:
         """Return the answers to several steps of this A, which reads its factor once for all.

@@ -5,19 +5,21 @@ forward substitution, made once), the free motion under further forces p there i
 
     x_c = (A⁻¹b)_c + G p
 
-so a pass costs the small problem, and the last one a backward substitution more. ``JointSolver``
-uses it where the solver is ``Condensed``. All arrays here are those of all ranks, on every rank.
+so a pass costs the small problem, and the last one a backward substitution more. Where Newton's
+method has found the end of a step already (``Expected``), its reactions are G⁻¹ times what the
+contact unknowns have moved by them, and no small problem is solved. ``JointSolver`` uses it where
+the solver is ``Condensed``. All arrays here are those of all ranks, on every rank.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy.linalg import lapack
 
-from ..core.algebra import Array, Mask
+from ..core.algebra import Array, Mask, max_abs
 from ..core.step import StepProblem, StepResult
 from ..core.surfaces import ContactSurface
 from ..kernels.condensation import Condensation
@@ -48,6 +50,23 @@ class PassEnd:
     iterations: int
 
 
+@dataclass(frozen=True)
+class Expected:
+    """Hold where a step is expected to end, a row for each of the M conditions of all ranks.
+
+    Attributes:
+        gap: what is left of the gap (M,) [m], zero where a point is closed.
+        slip: of the step (M, d - 1) [m], zero where a point sticks.
+        closed: (M,).
+        sticks: (M,) points that do not slip.
+    """
+
+    gap: Array
+    slip: Array
+    closed: Mask
+    sticks: Mask
+
+
 class CondensedPasses:
     """Solve steps that differ in their forces at contact unknowns from a base step.
 
@@ -64,6 +83,7 @@ class CondensedPasses:
         flexibility: Array,
         compliance: Array,
         surface: ContactSurface,
+        rigid: Mask,
         name: str,
     ) -> None:
         """Hold A condensed.
@@ -75,6 +95,7 @@ class CondensedPasses:
             flexibility: G, with the compliance.
             compliance: of the contact unknowns, over the scale.
             surface: the contact conditions.
+            rigid: (M,) which supports are.
             name: of the method.
         """
         self._condensed = condensed
@@ -82,6 +103,7 @@ class CondensedPasses:
         self.flexibility = flexibility
         self._compliance = compliance
         self.surface = surface
+        self._rigid = rigid
         self._name = name
         self.width = len(compliance) // max(surface.total, 1)
         self._free = np.zeros(0)
@@ -108,10 +130,74 @@ class CondensedPasses:
             before: the pass before in this step, from which the search begins; None: the first.
         """
         near = None if before is None else before.r
-        free = self._free + self.flexibility @ push - self._compliance * push
+        free = self._move(push)
         r, moved, closed, sticks, held, values, iterations = self._small(step, free, near)
         slip = np.where(sticks[:, None], 0.0, -moved[:, 1:])
         return PassEnd(moved[:, 0], slip, r, closed, sticks, held, values, iterations)
+
+    def _move(self, push: Array) -> Array:
+        """Return the contact unknowns (M d,) [m] without reactions, under a further push."""
+        return self._free + self.flexibility @ push - self._compliance * push
+
+    def balance(self, step: StepProblem, push: Array, expected: Expected) -> PassEnd:
+        """Return an expected end with the reactions that hold it there. Collective.
+
+        They may miss the conditions of contact and friction: ``settle`` looks.
+
+        Args:
+            step: with its own bound and friction.
+            push: the further forces (M d,) at contact unknowns, ``scale`` times newtons.
+            expected: where the step ends.
+        """
+        assert self.stiffness is not None  # whoever asks has looked
+        columns = [step.bound[:, None]]
+        if step.slip0 is not None:
+            columns.append(step.slip0)
+        values = np.asarray(self.surface.everywhere(np.hstack(columns)))
+
+        # The reactions move the contact unknowns from where they would be without any.
+        moved = np.column_stack([expected.gap, -expected.slip])
+        q = values - self._move(push).reshape(values.shape)
+        r = (self.stiffness @ (moved - q).ravel()).reshape(values.shape)
+        held = np.zeros(values.size, dtype=bool)
+        places = (expected.gap, expected.slip, r, expected.closed, expected.sticks)
+        return PassEnd(*places, held, values.ravel(), 0)
+
+    def settle(self, step: StepProblem, end: PassEnd) -> tuple[PassEnd, float]:
+        """Return an end with its reactions put onto their conditions, and by how much. Collective.
+
+        Args:
+            step: with its own bound and friction.
+            end: what ``balance`` has returned.
+
+        Returns:
+            The end, and the largest change of a reaction over the largest reaction.
+        """
+        r = end.r.copy()
+        r[:, 0] = np.where(end.closed, np.maximum(r[:, 0], 0.0), 0.0)
+        beyond = np.zeros(1)
+
+        # Points that slip are on their limit, along the slip; those that stick stay within it.
+        if self.width > 1:
+            limit = self._find_limit(step, r[:, 0])
+            way = np.linalg.norm(end.slip, axis=1)
+            goes = ~end.sticks & (way > 0.0)
+            e = np.divide(end.slip, way[:, None], out=np.zeros(end.slip.shape), where=goes[:, None])
+            beyond = np.where(goes, 0.0, np.linalg.norm(r[:, 1:], axis=1) - limit)
+            r[:, 1:] = np.where(goes[:, None], limit[:, None] * e, r[:, 1:])
+        size = max_abs(end.r)
+        missing = max(max_abs(r - end.r), beyond.max(initial=0.0)) / (size or 1.0)
+        held = np.repeat(end.sticks[:, None], self.width, axis=1)
+        held[:, 0] = (r[:, 0] != 0.0) & self._rigid
+        held &= bool(r.any())
+        return replace(end, r=r, held=held.ravel()), float(missing)
+
+    def _find_limit(self, step: StepProblem, r_n: Array) -> Array:
+        """Return the largest tangential reactions (M,) at normal ones (M,). Collective."""
+        law: Any = step.friction
+        both = np.column_stack([step.scale * law.cohesion, law.mu])
+        cohesion, mu = np.asarray(self.surface.everywhere(both)).T
+        return np.asarray(cohesion + mu * r_n)
 
     def finish(self, push: Array, end: PassEnd) -> StepResult:
         """Return the answer of the last pass, by a backward substitution. Collective.

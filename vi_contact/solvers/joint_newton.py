@@ -6,10 +6,11 @@ of the bodies at their contact unknowns, and S the slopes of the law, the change
     (H + scale S_F) du_n + r' - r'_old = scale (F(g) - F),       0 <= r'  ⊥  g - du_n >= 0
     (H + r' S_mu e eᵀ) du_t = -e (r' (mu(w) - mu) + scale (C(g) - C))
 
-along the slip e of points that slip; those that stick do not move. The contact conditions are met
-by the primal-dual active set method: points that would go into the obstacle are closed, those that
-would be pulled are opened, until none is left. In space the limit of friction also turns with the
-slip, which adds limit/|slip| across it.
+along the slip e of points that slip; those that stick do not move. Where the pass is only supposed,
+its reactions miss their conditions by something, which stands at the right of both. The contact
+conditions are met by the primal-dual active set method: points that would go into the obstacle are
+closed, those that would be pulled are opened, until none is left. In space the limit of friction
+also turns with the slip, which adds limit/|slip| across it.
 """
 
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ..core.algebra import Array, Mask
 from ..core.joints import JointStep, Strength
-from .condensed_passes import CondensedPasses, PassEnd
+from .condensed_passes import CondensedPasses, Expected, PassEnd
 
 SETS = 12  # contact sets of one step of Newton's method
 
@@ -45,8 +46,8 @@ def correct(
     there: Strength,
     used: Strength,
     scale: float,
-) -> tuple[Array, Array] | None:
-    """Return where the end of the step is expected, (openings, slips). Collective.
+) -> Expected | None:
+    """Return where the end of the step is expected. Collective.
 
     None where the matrix of Newton's method is not positive: the joint snaps back.
 
@@ -59,16 +60,14 @@ def correct(
         used: the strength of the pass [N].
         scale: how many times newtons its reactions are.
     """
-    surface = small.surface
-    g1, s1 = place
     law = _linearise(joint, end, small, place, there, used, scale)
+    g1 = np.asarray(small.surface.everywhere(place[0]))
     try:
-        du = _solve(law, end, small, np.asarray(surface.everywhere(g1)))
+        du, closed = _solve(law, end, small, g1)
     except LinAlgError:
         return None
-    own = surface.mine(du)
-    g2 = np.maximum(g1 - own[:, 0], 0.0)
-    return g2, s1 + own[:, 1:] if small.width > 1 else s1
+    gap = np.where(closed, 0.0, np.maximum(g1 - du[:, 0], 0.0))
+    return Expected(gap, end.slip + du[:, 1:], closed, end.sticks)
 
 
 def _linearise(
@@ -99,22 +98,23 @@ def _linearise(
     springs = np.zeros((count, width, width))
     force = np.zeros((count, width))
     springs[:, 0, 0] = scale * of_tension
-    force[:, 0] = scale * tension
+    force[:, 0] = scale * tension + np.where(end.closed, 0.0, end.r[:, 0])
     if width > 1:
         way = np.linalg.norm(end.slip, axis=1)
         moves = way > 0.0
         e = np.divide(end.slip, way[:, None], out=np.zeros(end.slip.shape), where=moves[:, None])
         along = e[:, :, None] * e[:, None, :]
         across = moves[:, None, None] * np.eye(width - 1) - along
-        turn = np.divide(scale * limit + mu * r_n, way, out=np.zeros(count), where=moves)
+        bears = scale * limit + mu * r_n
+        turn = np.divide(bears, way, out=np.zeros(count), where=moves)
         springs[:, 1:, 1:] = (r_n * of_mu)[:, None, None] * along
         springs[:, 1:, 1:] += turn[:, None, None] * across
-        force[:, 1:] = -e * (r_n * friction + scale * cohesion)[:, None]
+        force[:, 1:] = end.r[:, 1:] - e * (bears + r_n * friction + scale * cohesion)[:, None]
     return Linearised(springs, force)
 
 
-def _solve(law: Linearised, end: PassEnd, small: CondensedPasses, g1: Array) -> Array:
-    """Return the changes (M, d) [m] of the contact unknowns.
+def _solve(law: Linearised, end: PassEnd, small: CondensedPasses, g1: Array) -> tuple[Array, Mask]:
+    """Return the changes (M, d) [m] of the contact unknowns, and the contact set (M,).
 
     Args:
         law: about the end of the pass.
@@ -135,7 +135,7 @@ def _solve(law: Linearised, end: PassEnd, small: CondensedPasses, g1: Array) -> 
         if not (opens.any() or closes.any()):
             break
         closed = (closed & ~opens) | closes
-    return du
+    return du, closed
 
 
 def _solve_on_set(

@@ -2,8 +2,11 @@
 
 A pass is a step of the contract with known strengths F, C, mu and P (``core.joints``). Its answer
 opens the joint by g and slips it by w, and the law has other strengths there. Newton's method
-(``joint_newton``) expects an end of the step, and the law there gives the next strengths. Where a
-pass is no better than the best one, a part of Newton's step is gone.
+(``joint_newton``) expects an end of the step, and the law there gives the next strengths. Newton's
+method goes on from there without a pass, while the points that are closed and those that stick stay
+the same ones; where it meets all conditions it has the answer, as it mostly does. Else another pass
+is made. Where a pass is no better than the best one, a part of Newton's step is gone. A joint that
+holds everywhere needs no pass.
 
 Where Newton's matrix is not positive, the joint loses more than the bodies give way: the step has
 several answers (*snap-back*). The next pass then takes the strengths of the answer as they are,
@@ -28,13 +31,16 @@ from ..core.step import StepProblem
 from ..core.verify import kkt_residual
 from .acceleration import Anderson
 from .certified import Certified
-from .condensed_passes import CondensedPasses, PassEnd
+from .condensed_passes import CondensedPasses, Expected, PassEnd
 from .joint_newton import correct
 from .joint_rates import RatePasses, find_push
 
 log = logging.getLogger(__name__)
 
 MOST = 100  # passes of a step
+FASTER = 0.1  # of what was missed before: Newton's method goes on with the sets that it has
+# of the largest reaction: what an end misses that is near enough to be the one that passes lead to
+CLOSE = 1e-3
 AIM = 0.1  # of the tolerance: what passes on the contact unknowns come to
 WATER = 400  # times that water follows what a static stage has opened
 ADVICE = "try a smaller dt, or a joint that loses its strength over a longer way"
@@ -131,16 +137,15 @@ class JointSolver:
             base: the step without its joint.
             joint: at the beginning of the step.
         """
-        used = joint.guess(base)
         if not joint.implicit:
             self.passes.append(1)
-            return self._judge(joint.apply(base, used))
+            return self._judge(joint.apply(base, joint.guess(base)))
         small = None if self._make_passes is None else self._make_passes(base)
         if hasattr(joint.law, "at_speed"):
             return self._solve_rates(base, joint, small)
         if small is not None and small.stiffness is not None and base.surface.total:
-            return self._solve_small(base, joint, used, small)
-        return self._solve_whole(base, joint, used)
+            return self._solve_small(base, joint, small)
+        return self._solve_whole(base, joint, joint.guess(base))
 
     def _judge(self, step: StepProblem) -> tuple[StepProblem, Certified]:
         """Return a step and its certified answer, with ``law`` in the certificate. Collective."""
@@ -168,18 +173,22 @@ class JointSolver:
         raise self._refuse(base, certified.certificate.law)
 
     def _solve_small(
-        self, base: StepProblem, joint: JointStep, used: Strength, small: CondensedPasses
+        self, base: StepProblem, joint: JointStep, small: CondensedPasses
     ) -> tuple[StepProblem, Certified]:
         """Solve by passes on the contact unknowns. Collective.
 
         Args:
             base: the step without its joint.
             joint: at the beginning.
-            used: the strength to begin with.
             small: makes the passes.
         """
         surface = base.surface
         small.begin(base)
+        used = joint.guess(base)
+        found = self._try_rest(base, joint, used, small)
+        if found is not None:
+            self.passes.append(1)
+            return found
         lag = np.inf
         least = np.inf
         part = 1.0  # of Newton's step that is gone
@@ -205,15 +214,96 @@ class JointSolver:
                 return self._finish(step, small, push, end, count)
             part = min(1.0, 2.0 * part) if lag < least else 0.5 * part
             least = min(least, lag)
-            correction = correct(joint, end, small, (g1, s1), there, used, step.scale)
-            if correction is None:
+            expected = correct(joint, end, small, (g1, s1), there, used, step.scale)
+            if expected is None:
                 snaps = self._tell_snap(base, told=snaps)
                 used = there
                 continue
-            g2, s2 = correction
-            used = joint.ask(g1 + part * (g2 - g1), s1 + part * (s2 - s1))
+            if part < 1.0:
+                g2 = surface.mine(expected.gap)
+                s2 = s1 + surface.mine(expected.slip - end.slip)
+                used = joint.ask(g1 + part * (g2 - g1), s1 + part * (s2 - s1))
+                continue
+            step, answer = self._follow(base, joint, small, expected, count)
+            if answer is not None:
+                self.passes.append(count)
+                return step, answer
+            used = step.joint.used
         # Passes by whole steps take another way, and ask methods that were named to escalate to.
         return self._solve_whole(base, joint, joint.guess(base))
+
+    def _try_rest(
+        self, base: StepProblem, joint: JointStep, used: Strength, small: CondensedPasses
+    ) -> tuple[StepProblem, Certified] | None:
+        """Return the answer where no point opens or slips, as of a joint that holds. Collective.
+
+        Then no small problem is solved. None where some point moves, which the passes find.
+
+        Args:
+            base: the step without its joint.
+            joint: at the beginning.
+            used: the strength to begin with.
+            small: makes the passes.
+        """
+        surface = base.surface
+        if surface.some(~base.active | (joint.g0 > 0.0)):
+            return None
+        if base.slip0 is not None and surface.some(~joint.find_sticking(used)):
+            return None
+        still = np.ones(surface.total, dtype=bool)
+        nothing = np.zeros((surface.total, small.width))
+        place = Expected(nothing[:, 0], nothing[:, 1:], still, still)
+        step = joint.apply(base, used)
+        push = find_push(step, small.width)
+        end, missing = small.settle(step, small.balance(step, push, place))
+        if not missing <= AIM * self._tolerance:
+            return None
+        answer = _certify(step, small, push, end, 1)
+        return (step, answer) if answer.worst <= self._tolerance else None
+
+    def _follow(
+        self,
+        base: StepProblem,
+        joint: JointStep,
+        small: CondensedPasses,
+        expected: Expected,
+        count: int,
+    ) -> tuple[StepProblem, Certified | None]:
+        """Repeat Newton's method from where it leads, while the sets stay. Collective.
+
+        No small problem is solved. It ends at the answer of the step, or where the conditions of
+        contact and friction are no longer met better.
+
+        Args:
+            base: the step without its joint.
+            joint: at the beginning.
+            small: makes the passes.
+            expected: the end of the step after the last pass.
+            count: how many passes there were.
+
+        Returns:
+            The step with the last strength, and its certified answer; None: it has none.
+        """
+        surface = base.surface
+        least = CLOSE / FASTER
+        while True:
+            g1 = surface.mine(expected.gap)
+            s1 = joint.s0 + surface.mine(expected.slip)
+            used = joint.ask(g1, s1)
+            step = joint.apply(base, used)
+            push = find_push(step, small.width)
+            there = small.balance(step, push, expected)
+            end, missing = small.settle(step, there)
+            if missing <= AIM * self._tolerance:
+                answer = _certify(step, small, push, end, count)
+                return step, answer if answer.worst <= self._tolerance else None
+            if not missing <= FASTER * least:
+                return step, None
+            least = missing
+            further = correct(joint, there, small, (g1, s1), used, used, step.scale)
+            if further is None:
+                return step, None
+            expected = further
 
     def _finish(
         self, step: StepProblem, small: CondensedPasses, push: Array, end: PassEnd, count: int
@@ -227,10 +317,9 @@ class JointSolver:
             end: where it has led.
             count: how many passes there were, which are the iterations of the step.
         """
-        result = replace(small.finish(push, end), iterations=count)
-        certificate = kkt_residual(step, result)
-        if certificate.worst <= self._tolerance:
-            return step, Certified(result, certificate, escalated=False)
+        answer = _certify(step, small, push, end, count)
+        if answer.worst <= self._tolerance:
+            return step, answer
         step, certified = self._judge(step)
         if not certified.certificate.law <= self._tolerance:
             raise self._refuse(step, certified.certificate.law)
@@ -297,6 +386,22 @@ def _tell_uplift(base: StepProblem, what: str) -> StepFailure:
         f"and {what}: lower the level, add weight or drains, or march in time, where inertia "
         "decides"
     )
+
+
+def _certify(
+    step: StepProblem, small: CondensedPasses, push: Array, end: PassEnd, count: int
+) -> Certified:
+    """Return the answer of a pass with its certificate. Collective.
+
+    Args:
+        step: the step for r' with the strength of the pass.
+        small: which has made it.
+        push: its further forces.
+        end: where it has led.
+        count: how many passes there were, which are the iterations of the step.
+    """
+    result = replace(small.finish(push, end), iterations=count)
+    return Certified(result, kkt_residual(step, result), escalated=False)
 
 
 def _without_joint(step: StepProblem) -> StepProblem:

@@ -316,7 +316,7 @@ def _explain_certificate(run: RunFolder) -> Section:
         curves.append(energy)
     curves.append(charts.chart_certificate(run))
 
-    warnings = (energy_warning(facts), facts.get("sampling"))
+    warnings = (energy_warning(facts), facts.get("sampling"), facts.get("joint_elements"))
     sentences += [f"Warning: {warning}." for warning in warnings if warning]
     return Section("Solver, certificate and energies", sentences, tables, charts=curves)
 

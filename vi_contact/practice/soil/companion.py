@@ -24,7 +24,7 @@ from ...core.system import Load
 from ...fem.matrices.own_matrices import system_from_arrays
 from ...laws.mass import ConsistentMass
 from ...run.march import march
-from ...run.time_steps import LARGEST, ErrorControlled, HalvedAtImpact, Schedule, TimeSteps
+from ...run.time_steps import LARGEST, Halved, Schedule, TimeSteps
 
 
 class CompanionRun:
@@ -60,11 +60,11 @@ class CompanionRun:
 
         Raises:
             InputError: steps that the run itself chooses while it goes (``HalvedAtImpact``,
-                ``ErrorControlled``).
+                ``ErrorControlled``, ``BySlipRate``).
         """
         if self._bound is not None and self._bound == (scheme, dt):
             return
-        if isinstance(dt, HalvedAtImpact | ErrorControlled):
+        if isinstance(dt, Halved):
             raise InputError(
                 f"{self.name} is computed beside the run and needs its time steps beforehand, but "
                 f"the run has {dt!r}: give dt as a number or a Schedule"

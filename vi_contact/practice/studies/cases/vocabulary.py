@@ -46,7 +46,7 @@ from ....laws.impact import VelocityUpdate
 from ....laws.materials import Damping, LinearElastic, Section
 from ....laws.orthotropic import Orthotropic
 from ....meshes.gmsh_session import MeshScript
-from ....run import ErrorControlled, HalvedAtImpact, Schedule
+from ....run import BySlipRate, ErrorControlled, HalvedAtImpact, Schedule
 from ....run.files.writer import FieldWriter
 from ....solvers import friction, normal, volume
 from ....solvers.condensed import SmallMethod
@@ -89,7 +89,7 @@ _KINDS: Mapping[ModuleType, tuple[Any, ...]] = {  # room -> the kinds of things 
     friction: (FrictionMethod, Extrapolation),
     volume: (Method,),
     schemes: (Scheme,),
-    run: (Solver, Schedule, HalvedAtImpact, ErrorControlled, Recorder),
+    run: (Solver, Schedule, HalvedAtImpact, ErrorControlled, BySlipRate, Recorder),
     checks: (Check,),
     soil: (SoilCurves,),
 }

@@ -14,6 +14,7 @@ from .....core.files import on_root, to_json, write_atomically
 from .....core.problem import ContactProblem
 from .....run.damping import NOT_COMPUTED, describe_damping, first_modes, first_open_period
 from .....run.files.folder import MODEL
+from .....run.joint_elements import joint_warning
 from .....run.loose_bodies import judge_loose_bodies
 from .....run.sampling import sampling_warning
 from .....run.time_steps import StepPlan
@@ -161,6 +162,9 @@ def _add_findings(
             f"lambda of the joint is {size:.3g}: it may snap back inside a step, which then has "
             "several answers; take a smaller dt or, without mass at the contact, smaller elements"
         )
+    of_joint = joint_warning(problem)
+    if of_joint:
+        model["warnings"].append(of_joint)
     for sentence, refused in judge_loose_bodies(problem) if problem.system.floating else ():
         model["defects" if refused else "warnings"].append(sentence)
 
