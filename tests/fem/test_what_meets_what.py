@@ -61,7 +61,14 @@ TAKEN = {
     "yields": {"default", "Midpoint", "ZienkiewiczWoodTaylor"},
     "turns": {"default", "EnergyMomentum"},
 }
-JOINTS = {"default", "Midpoint", "ZienkiewiczWoodTaylor", "SS22"}
+JOINTS = {
+    "default",
+    "Midpoint",
+    "ZienkiewiczWoodTaylor",
+    "SS22",
+    "EnergyMomentum",
+    "ContactStabilisedNewmark",
+}
 
 
 def throw_block(body: str, contact: str) -> vc.ContactProblem:
