@@ -29,8 +29,10 @@ FOLLOW = 0.1  # of the residual: what the shifted problem may leave where the sh
 ENOUGH = 1e-2  # of the tolerance: a residual from which on no more is asked for
 MOST_STEPS = 60  # of Newton
 SLOW = 0.5  # of the residual: a step that leaves more of it is slow,
-PATIENCE = 4  # and after so many in a row, below the goal, rounding is reached
-SEEN = 3  # times that a set of states may come again before Newton goes in circles
+PATIENCE = 4  # and after so many in a row rounding is reached. Where traces depend on one another
+# that is the rounding of q, which no r removes; the certificate of the step judges. Below
+STALLED = 1e-6  # of the residual of r = 0 it is taken for that
+SEEN = 2  # how often a set of states may come before Newton goes in circles
 
 
 class SparseDelassus(ScaledDelassus):
@@ -120,20 +122,20 @@ class SparseNewton:
         self.kept = KeptFactor()
 
     def solve(self, step: ScaledProblem, guess: Array | Mask | None) -> LastIterate:
-        """Solve problem (1) of ``problem``, to rounding or to the tolerance.
+        """Solve problem (1) of ``problem``, as far as rounding lets it.
 
         Args:
             step: the problem.
             guess: (m,) predicted contact set, or reactions (m, d) [N].
 
         Raises:
-            StepFailure: the tolerance is not reached.
+            StepFailure: the states do not settle.
         """
         r = step.start(guess if step.unit > 0.0 else None)
         if not step.unit > 0.0:
             return LastIterate(r, 0, [])
         last = self._iterate(step, r)
-        step.result(self._method, self._method.tolerance, last)  # refuses
+        step.result(self._method, STALLED, last)  # refuses
         return last
 
     def _iterate(self, step: ScaledProblem, r: Array) -> LastIterate:
@@ -164,7 +166,7 @@ class SparseNewton:
             slow = 0 if residual <= SLOW * least else slow + 1
             if residual < least:
                 best, least = r, residual
-            is_rounding = slow >= PATIENCE and least <= goal
+            is_rounding = slow >= PATIENCE and least <= STALLED * step.unit
             if residual <= max(ENOUGH * goal, step.rounding(r)) or is_rounding:
                 break
             # The shift follows where r solves the shifted problem better than the one wanted.
