@@ -135,3 +135,23 @@ def test_iterations_follow_the_rows_that_changed() -> None:
         assert x is not None and kept.factors == 1
         assert kept.iterations - before <= k + 1
         assert np.abs(changed @ x - right).max() < 1e-8 * np.abs(right).max()
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("depth", [None, 0.2], ids=["plane", "space"])
+def test_iterative_rubs_where_conditions_share_unknowns(depth: Any) -> None:
+    """The same answers as Condensed, whose factor is a sum of iterations here."""
+    pytest.importorskip("petsc4py")
+    problem = make_wall(MPI.COMM_WORLD, depth)
+    ends = []
+    for solver in (vc.Iterative("jacobi"), vc.Condensed()):
+        stepper = vc.Stepper(problem, solver=solver)
+        for _ in range(3):
+            trial = stepper.attempt(1e-3)
+            assert trial.report.certificate.worst < 1e-9
+            stepper.accept(trial)
+        ends.append(stepper.state)
+    for name in ("u", "v", "r_n", "r_t"):
+        one, two = (getattr(end, name) for end in ends)
+        size = MPI.COMM_WORLD.allreduce(np.abs(two).max(initial=0.0), MPI.MAX)
+        assert np.allclose(one, two, rtol=0.0, atol=1e-10 * size), name

@@ -29,9 +29,9 @@ FOLLOW = 0.1  # of the residual: what the shifted problem may leave where the sh
 ENOUGH = 1e-2  # of the tolerance: a residual from which on no more is asked for
 MOST_STEPS = 60  # of Newton
 SLOW = 0.5  # of the residual: a step that leaves more of it is slow,
-PATIENCE = 4  # and after so many in a row rounding is reached. Where traces depend on one another
-# that is the rounding of q, which no r removes; the certificate of the step judges. Below
-STALLED = 1e-6  # of the residual of r = 0 it is taken for that
+PATIENCE = 4  # and after so many in a row, below the goal, rounding is reached. With states that
+# stay it is the rounding of q, which no r removes where traces depend on one another, below
+STALLED = 1e-6  # of the residual of r = 0; the certificate of the step judges
 SEEN = 2  # how often a set of states may come before Newton goes in circles
 
 
@@ -134,16 +134,20 @@ class SparseNewton:
         r = step.start(guess if step.unit > 0.0 else None)
         if not step.unit > 0.0:
             return LastIterate(r, 0, [])
-        last = self._iterate(step, r)
-        step.result(self._method, STALLED, last)  # refuses
+        last, tolerance = self._iterate(step, r)
+        step.result(self._method, tolerance, last)  # refuses
         return last
 
-    def _iterate(self, step: ScaledProblem, r: Array) -> LastIterate:
-        """Iterate by Newton's method until nothing but rounding is left, or in circles."""
-        goal = self._method.tolerance * step.unit
+    def _iterate(self, step: ScaledProblem, r: Array) -> tuple[LastIterate, float]:
+        """Iterate by Newton's method until nothing but rounding is left, or in circles.
+
+        With where it ended comes the residual that this may have, that of r = 0 being 1.
+        """
+        tolerance = self._method.tolerance
+        goal = tolerance * step.unit
         best = center = r
         least = np.inf
-        slow = 0
+        slow = stays = 0
         history: list[float] = []
         states: States | None = None
         seen: dict[bytes, int] = {}
@@ -164,15 +168,20 @@ class SparseNewton:
             residual = step.residual(r, w)
             history.append(residual / step.unit)
             slow = 0 if residual <= SLOW * least else slow + 1
+            stays = stays + 1 if states.key == before else 0
             if residual < least:
                 best, least = r, residual
-            is_rounding = slow >= PATIENCE and least <= STALLED * step.unit
-            if residual <= max(ENOUGH * goal, step.rounding(r)) or is_rounding:
+            if residual <= max(ENOUGH * goal, step.rounding(r)):
+                break
+            if slow >= PATIENCE and least <= goal:
+                break
+            if min(slow, stays) >= PATIENCE and least <= STALLED * step.unit:
+                tolerance = STALLED
                 break
             # The shift follows where r solves the shifted problem better than the one wanted.
             if step.residual(r, w + self._spread(r - center)) <= FOLLOW * residual:
                 center = r
-        return LastIterate(best, len(history), history)
+        return LastIterate(best, len(history), history), tolerance
 
     def _spread(self, r: Array) -> Array:
         """Return σ Z Zᵀ r (m, d)."""
