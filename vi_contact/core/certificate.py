@@ -16,7 +16,8 @@ class Certificate:
             is M a + C v + K u - f + Bᵀ r in the forces of the step themselves. The last term
             matters on fine meshes only, where the parts of A x cancel: it keeps the rounding errors
             of the residual itself (1e-16 |A||x|) below the tolerance; what passes at 1e-9 is then
-            at most 1e-14 |A||x|.
+            at most 1e-14 |A||x|. Bodies that turn are displaced by their own size: of them the
+            last term is 1e-6 |A_ii| |x|, which is ten times their rounding.
         penetration: max(-gap, 0) / x_ref.
         tension: max(-r_n, 0) / r_ref.
         complementarity: max |gap| / x_ref over active and bilateral conditions, max |r_n| / r_ref

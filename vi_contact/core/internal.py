@@ -50,6 +50,12 @@ class TwoEndForce(InternalForce, Protocol):
         Passes are solved with it. It decides how many there are, and nothing of the answer.
         """
 
+    def turn_on(self, u0: Array, u1: Array) -> Array:
+        """Return where u1 (n,) [m] would be if bodies turned on their way from u0.
+
+        Passes begin there.
+        """
+
 
 @dataclass(frozen=True)
 class InTurnedUnknowns:
@@ -189,6 +195,10 @@ class BetweenTurnedUnknowns(InTurnedUnknowns):
         tangent = self.internal.between_tangent(self.T @ u0, self.T @ u1)
         turned: Any = self.algebra.congruence(self.T, tangent)
         return turned
+
+    def turn_on(self, u0: Array, u1: Array) -> Array:
+        """Return the place in the unknowns û, Tᵀ u (n,) [m], as T turns axes."""
+        return self.T.transpose_apply(self.internal.turn_on(self.T @ u0, self.T @ u1))
 
 
 def turns(internal: InternalForce | None) -> bool:

@@ -61,6 +61,10 @@ class JointLaw(Protocol):
     - ``dilation(committed)``: how far slip has lifted the point (m,) [m]. Else not at all.
     - ``prestress``: with ``normal`` and ``shear`` [Pa]. Else None.
     - ``softening_of(pressure)``: the steepest losses, a positive ``Slope``; pressure (m,) [Pa].
+    - ``lay(surface, rows)``: itself at conditions of this rank, for water that must know them all.
+    - ``at_time(t)``: itself with the water of a time [s].
+    - ``water_follows``: True where static stages let water into what opens. Else False.
+    - ``find_crack(g)``: how long the crack from the wet end is [m]. Else 0.
     - ``at_speed(committed, speed, dt)``: (mu, d mu / d ln speed) (m,) of slip rates [m/s] > 0, for
       laws whose steps are solved for the rate (``RateAndState``).
     """

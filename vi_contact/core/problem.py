@@ -225,12 +225,14 @@ def on_points(law: Any, surface: ContactSurface) -> Any:
     """Return a law of a joint with its functions of the points taken at those of this rank.
 
     A law that has functions says so by ``at_points(points)``, with points (m, d) [m], one that is
-    made of laws of parts by ``on_surface(surface)``.
+    made of laws of parts by ``on_surface(surface)``. One with water in it has
+    ``lay(surface, rows)``.
     """
     if hasattr(law, "on_surface"):
         return law.on_surface(surface)
     at_points = getattr(law, "at_points", None)
-    return law if at_points is None else at_points(surface.points)
+    law = law if at_points is None else at_points(surface.points)
+    return law.lay(surface, np.arange(surface.count)) if hasattr(law, "lay") else law
 
 
 def replace_tuples(

@@ -147,6 +147,17 @@ class Stage:
             return internal.between_tangent(self.between, place)  # type: ignore[no-any-return]
         return internal.tangent(place)  # type: ignore[no-any-return]
 
+    def find_start(self, system: SemiDiscreteSystem) -> Array | None:
+        """Return the increment (n,) at which passes begin; None for zero.
+
+        Args:
+            system: the equations that are marched.
+        """
+        if self.between is None:
+            return None
+        both: Any = system.internal
+        return np.asarray(both.turn_on(self.between, self.guess) - self.guess)
+
     def find_place(self, d: Array | None = None) -> Array:
         """Return the displacement (n,) [m] at which the internal force is asked for.
 
@@ -243,9 +254,18 @@ class NonlinearForces:
     system: SemiDiscreteSystem
     stage: Stage
 
+    @property
+    def turns(self) -> bool:
+        """Say whether the internal force is that of a body that turns."""
+        return self.stage.between is not None
+
     def find_rest(self, d: Array) -> Array:
         """Return what is left of the forces at an increment (n,): b - A d of a linear body."""
         return find_rest(self.system, self.stage, d)[0]
+
+    def find_start(self) -> Array | None:
+        """Return the increment (n,) at which passes begin; None for zero."""
+        return self.stage.find_start(self.system)
 
     def find_tangent(self, d: Array) -> Matrix:
         """Return p'(u) (n, n) [N/m] at an increment (n,)."""

@@ -103,6 +103,10 @@ class State:
 class StepForces(Protocol):
     """Know the forces of a step whose body is not linear (``core.stage.NonlinearForces``)."""
 
+    @property
+    def turns(self) -> bool:
+        """Say whether the body turns: its displacements may be as large as itself."""
+
     def find_rest(self, d: Array) -> Array:
         """Return what is left of them at x = d (n,), in the unit of b: b - A d if linear."""
 

@@ -23,6 +23,10 @@ from .step import StepProblem, StepResult
 # much smaller than the displacements of a step a slip may be that friction is judged by
 # (``Certificate`` has the reasons).
 ROUNDING = 1e-5
+# The first for bodies that turn, whose displacements are as large as themselves: ten times what
+# rounding of their strains leaves (1e-16 |A||x|) is then the tolerance of 1e-9, and forces count
+# wherever they can be told from that.
+ROUNDING_TURNED = 1e-6
 FEW = 5_000  # numbers in an array, up to which copies cost less than calls
 
 
@@ -158,7 +162,8 @@ def _make_certificate(step: StepProblem, result: StepResult, sizes: _Sizes) -> C
     # force, in the units of x and of b.
     length = max(sizes.x, sizes.guess)
     force = max(sizes.load, sizes.internal, sizes.r_n)
-    rounding = ROUNDING * step.A.largest * (sizes.x if step.origin is None else length)
+    share = ROUNDING_TURNED if step.forces is not None and step.forces.turns else ROUNDING
+    rounding = share * step.A.largest * (sizes.x if step.origin is None else length)
     cone, dissipation = _judge_friction(step, result, length, force)
     return Certificate(
         equilibrium=_divide(

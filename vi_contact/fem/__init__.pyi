@@ -12,6 +12,7 @@ from .body.loads import TangentialTraction as TangentialTraction
 from .body.loads import Traction as Traction
 from .body.own_forms import Forms as Forms
 from .body.released_supports import release as release
+from .body.reservoir import Reservoir as Reservoir
 from .body.space import bodies_of as bodies_of
 from .body.ties import Tied as Tied
 from .contact.find_joints import contact_pairs as contact_pairs

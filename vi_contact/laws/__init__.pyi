@@ -21,6 +21,7 @@ from .iwan import Iwan as Iwan
 from .j2 import J2 as J2
 from .joint import Joint as Joint
 from .joint_values import Prestress as Prestress
+from .joint_water import JointWater as JointWater
 from .mass import ConsistentMass as ConsistentMass
 from .mass import Redistributed as Redistributed
 from .materials import DampingRatio as DampingRatio

@@ -16,15 +16,17 @@ P.-E. Petersson, Cem. Concr. Res. 6 (1976) 773-782 (linear); D. S. Dugdale, J. M
 """
 
 import math
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from ..core.algebra import Array
+from ..core.algebra import Array, Indices
 from ..core.errors import InputError
 from ..core.joint_laws import Committed, Slope, Strength
 from ..core.quantities import RATIO, Unit
+from ..core.surfaces import ContactSurface
 from .joint_values import (
     NotNegativeByPoint,
     OfPoints,
@@ -32,7 +34,9 @@ from .joint_values import (
     Prestress,
     compare_fields,
     measure_length,
+    take_mean_of_line,
 )
+from .joint_water import JointWater, PlacedWater
 
 SHORT = 1e-6  # of dc: over a shorter way the slope of the mean is half that of the law
 ROUNDING = 1e-9  # relative: a cohesion that is mu times the tensile strength but for rounding
@@ -50,8 +54,9 @@ class Joint(OfPoints):
         opening: dc [m], at which nothing is left; of a joint without tension, the slip.
         softening: "linear", "brittle" or "constant".
         dilatancy: tan(psi), by how much slip lifts the joint.
-        water: pressure of the water in the joint [Pa], given and kept. It presses both faces, and
-            friction does not feel it: reactions are total ones, effective ones less by it.
+        water: pressure of the water in the joint [Pa], given and kept, or ``JointWater``. It
+            presses both faces, and friction does not feel it: reactions are total ones, effective
+            ones less by it.
         prestress: stresses before anything moves; None for none.
         implicit: False takes the strength that is there before each step.
     """
@@ -63,7 +68,7 @@ class Joint(OfPoints):
     opening: Annotated[PositiveByPoint | None, Unit("m"), "the opening"] = None
     softening: Literal["linear", "brittle", "constant"] = "linear"
     dilatancy: Annotated[NotNegativeByPoint, RATIO, "the dilatancy tan(psi)"] = 0.0
-    water: Annotated[NotNegativeByPoint, Unit("Pa"), "the water pressure"] = 0.0
+    water: Annotated[NotNegativeByPoint | JointWater, Unit("Pa"), "the water pressure"] = 0.0
     prestress: Prestress | None = None
     implicit: bool = True
 
@@ -71,6 +76,11 @@ class Joint(OfPoints):
         super().__post_init__()
         self.refuse_word("softening", ("linear", "brittle", "constant"))
         self._refuse_softening()
+        if isinstance(self.water, JointWater) and self.water.follows and not self.implicit:
+            raise InputError(
+                "Joint: water that follows the opening needs the strength of the answer: leave "
+                "implicit=False out, or give JointWater(follows=False)"
+            )
         self.refuse_where(
             compare_fields(
                 lambda mu, tension, cohesion: cohesion < mu * tension * (1.0 - ROUNDING),
@@ -104,6 +114,40 @@ class Joint(OfPoints):
         """Say whether there is any tangential strength, the same on all ranks."""
         return not (_is_zero(self.mu) and _is_zero(self.cohesion))
 
+    def lay(self, surface: ContactSurface, places: Indices) -> "Joint":
+        """Return the joint with its water at conditions of this rank. Collective.
+
+        Args:
+            surface: whose conditions they are.
+            places: their rows.
+        """
+        if not isinstance(self.water, JointWater):
+            return self  # numbers by point have been laid already
+        return replace(self, water=self.water.place(surface, places))
+
+    @property
+    def water_follows(self) -> bool:
+        """Say whether static stages let water into what opens."""
+        return isinstance(self.water, PlacedWater) and self.water.follows
+
+    def at_time(self, t: float) -> "Joint":
+        """Return the joint with the water of a time [s]."""
+        if not isinstance(self.water, PlacedWater) or self.water.history is None:
+            return self
+        other = copy(self)
+        object.__setattr__(other, "water", self.water.at_time(t))
+        return other
+
+    def find_crack(self, g: Array) -> float:
+        """Return how long the crack from the heel is [m], 0 without ``JointWater``. Collective.
+
+        Args:
+            g: openings (m,) [m].
+        """
+        if isinstance(self.water, PlacedWater):
+            return self.water.find_tip(g)[0] * self.water.length
+        return 0.0
+
     def _find_reach(self, count: int) -> Array:
         """Return dc (count,) [m]; 0 for a brittle joint."""
         return self.make_once("dc", count, lambda: self._make_reach(count))
@@ -134,13 +178,14 @@ class Joint(OfPoints):
         return np.divide(cohesion, tension, out=np.ones(count), where=tension > 0.0)
 
     def start(self, count: int) -> Committed:
-        """Return "kappa" and "opened" (count,) [m], and "way" [m], all zero.
+        """Return "kappa" and "opened" (count,) [m], and "way" [m], all zero; and the water's.
 
         Args:
             count: number of points.
         """
         zero = np.zeros(count)
-        return {"kappa": zero, "opened": zero, "way": zero}
+        start = {"kappa": zero, "opened": zero, "way": zero}
+        return start | self.water.start() if isinstance(self.water, PlacedWater) else start
 
     def _left(self, kappa: Array, dc: Array) -> Array:
         """Return D (m,)."""
@@ -154,14 +199,12 @@ class Joint(OfPoints):
         """Return the mean of D between two kappa (m,) [m], first <= last."""
         if self.softening == "brittle":
             return self._left(last, dc)
-        a = np.minimum(first, dc)
-        b = np.minimum(last, dc)
         way = last - first
-        # Beyond dc nothing is left, and between them the mean is that of the part below.
-        part = np.divide(b - a, way, out=np.ones(len(a)), where=way > 0.0)
         if self.softening == "linear":
-            return (1.0 - 0.5 * (a + b) / dc) * part
-        return np.where(way > 0.0, part, self._left(first, dc))
+            return take_mean_of_line(first, way, dc)
+        # Of constant strength the mean is the part of the way that lies below dc.
+        below = np.minimum(last, dc) - np.minimum(first, dc)
+        return np.divide(below, way, out=self._left(first, dc), where=way > 0.0)
 
     def _walk(
         self, committed: Committed, g1: Array, s1: Array
@@ -195,7 +238,7 @@ class Joint(OfPoints):
             g1: openings at its end.
             s0: slips (m, d - 1) [m] at its beginning.
             s1: slips at its end.
-            dt: its length [s]; not read.
+            dt: its length [s]; read by water alone.
         """
         count = len(g1)
         dc, turn, last, secant = self._walk(committed, g1, s1)
@@ -216,7 +259,11 @@ class Joint(OfPoints):
         cohesion = self.spread("cohesion", count)
         if not _is_zero(self.cohesion):
             cohesion = cohesion * self._mean_left(committed["kappa"], last, dc)
-        return Strength(tension, cohesion, self.spread("mu", count), self.spread("water", count))
+        if isinstance(self.water, PlacedWater):
+            water = self.water.find_in_step(committed, g0, dt)
+        else:
+            water = self.spread("water", count)
+        return Strength(tension, cohesion, self.spread("mu", count), water)
 
     def slope(
         self, committed: Committed, g0: Array, g1: Array, s0: Array, s1: Array, dt: float
@@ -259,14 +306,17 @@ class Joint(OfPoints):
             g1: openings at its end.
             s0: slips (m, d - 1) [m] at its beginning.
             s1: slips at its end.
-            dt: its length [s]; not read.
+            dt: its length [s]; read by water alone.
         """
         _, _, last, _ = self._walk(committed, g1, s1)
-        return {
+        after = {
             "kappa": last,
             "opened": np.maximum(committed["opened"], g1),
             "way": committed["way"] + measure_length(s1 - s0),
         }
+        if isinstance(self.water, PlacedWater):
+            after |= self.water.commit(committed, g0, g1, dt)
+        return after
 
     def stored(self, committed: Committed, g: Array) -> Array:
         """Return the energy [J/m²] that comes back when the joint closes, ½ f(kappa) g²/opened.

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -53,7 +54,8 @@ class JointsByPart:
             rows = np.searchsorted(slots_of_part, surface.slots[places])
             at_points = getattr(law, "at_points", None)
             taken: Any = law if at_points is None else at_points(surface.points[places])
-            bound.append((_take_rows(taken, rows, len(slots_of_part)), places))
+            taken = _take_rows(taken, rows, len(slots_of_part))
+            bound.append((taken.lay(surface, places) if hasattr(taken, "lay") else taken, places))
         return replace(self, _bound=tuple(bound))
 
     def list_values(self, surface: ContactSurface) -> list[Array]:
@@ -83,7 +85,7 @@ class JointsByPart:
         """Say whether the strength of a step is that of its answer."""
         return all(getattr(law, "implicit", True) for law in self.laws.values())
 
-    @property
+    @cached_property
     def prestress(self) -> Prestress | None:
         """Return the prestress of all parts, zero where a part has none."""
         parts = [(getattr(law, "prestress", None), places) for law, places in self._bound]
@@ -98,6 +100,32 @@ class JointsByPart:
                 shear[places] = before.spread("shear", len(places))
         nucleate = any(before is not None and before.nucleate for before, _ in parts)
         return Prestress(normal, shear, nucleate=nucleate)
+
+    @property
+    def water_follows(self) -> bool:
+        """Say whether static stages let water into what opens in some part."""
+        return any(getattr(law, "water_follows", False) for law, _ in self._bound)
+
+    def at_time(self, t: float) -> "JointsByPart":
+        """Return the laws with the water of a time [s]."""
+        later = tuple(
+            (law.at_time(t) if hasattr(law, "at_time") else law, places)
+            for law, places in self._bound
+        )
+        if all(law is before for (law, _), (before, _) in zip(later, self._bound, strict=True)):
+            return self
+        return replace(self, _bound=later)
+
+    def find_crack(self, g: Array) -> float:
+        """Return how long the longest crack with water in it is [m]. Collective.
+
+        Args:
+            g: openings (m,) [m].
+        """
+        lengths = [
+            law.find_crack(g[places]) for law, places in self._bound if hasattr(law, "find_crack")
+        ]
+        return max(lengths, default=0.0)
 
     def start(self, count: int) -> Committed:
         """Return the arrays of all laws, zero at points of other parts.

@@ -5,6 +5,9 @@ from .cross_check import cross_check as cross_check
 from .files.reading import RunFolder as RunFolder
 from .files.reading import read_run as read_run
 from .joint_uniqueness import joint_uniqueness as joint_uniqueness
+from .limit_load import LimitLoad as LimitLoad
+from .limit_load import limit_load as limit_load
+from .limit_load import tilt as tilt
 from .march import march as march
 from .march_many import march_many as march_many
 from .method import with_defaults as with_defaults
@@ -18,6 +21,7 @@ from .recorders import Racking as Racking
 from .recorders import Reactions as Reactions
 from .recorders import Resultants as Resultants
 from .recorders import SectionForces as SectionForces
+from .recorders import Uplift as Uplift
 from .rigid_blocks import RigidBlocks as RigidBlocks
 from .rigid_blocks import rigid_blocks as rigid_blocks
 from .rigid_limit import RigidLimit as RigidLimit

@@ -252,7 +252,7 @@ class Equilibria:
             base: the stage without its joint.
             old: the state before.
         """
-        joint = pose_joint(self._problem, old, 0.0, at_end=True)
+        joint = pose_joint(self._problem, old, 0.0, at_end=True, t=base.t)
         step, certified = self._joints.solve(base, joint)
         result = certified.result
         total = replace(result, r_n=result.r_n - step.joint.pull)

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from ..core.algebra import Array, max_abs
-from ..core.errors import StepFailure
+from ..core.errors import InputError, StepFailure
 from ..core.joints import JointStep, Strength, compare, judge_strength
 from ..core.step import StepProblem
 from ..core.verify import kkt_residual
@@ -36,6 +36,7 @@ log = logging.getLogger(__name__)
 
 MOST = 100  # passes of a step
 AIM = 0.1  # of the tolerance: what passes on the contact unknowns come to
+WATER = 400  # times that water follows what a static stage has opened
 ADVICE = "try a smaller dt, or a joint that loses its strength over a longer way"
 
 
@@ -80,6 +81,55 @@ class JointSolver:
 
         Raises:
             StepFailure: no pass has the strength of its answer, or a step has no answer.
+        """
+        if joint.at_end and getattr(joint.law, "water_follows", False):
+            return self._follow_water(base, joint)
+        return self._solve_passes(base, joint)
+
+    def _follow_water(self, base: StepProblem, joint: JointStep) -> tuple[StepProblem, Certified]:
+        """Solve a static stage whose water enters what opens. Collective.
+
+        The water is held fast while the passes find the rest; then it goes where the joint has
+        opened. More water opens more, so that pressures only grow, from those before the stage to
+        the nearest answer above them. Faster methods could pass it by.
+
+        Args:
+            base: the stage without its joint.
+            joint: at its beginning.
+
+        Raises:
+            StepFailure: there is no equilibrium: the water lifts the body off.
+        """
+        used = joint.guess(base)
+        passes = 0
+        for count in range(1, WATER + 1):
+            held = replace(joint, water=used.water)
+            try:
+                step, certified = self._solve_passes(base, held)
+            except (StepFailure, InputError) as failure:  # bodies that loads carry off are refused
+                if count == 1:
+                    raise
+                raise _tell_uplift(
+                    base, f"pass {count} has no equilibrium ({failure})"
+                ) from failure
+            passes += self.passes.pop()
+            found = certified.result
+            g1, s1 = joint.find_end(step, found)
+            there = replace(joint, used=step.joint.used).ask(g1, s1)
+            whole = replace(step, joint=replace(step.joint, water=None))
+            judged = _with_law(whole, certified)
+            if judged.certificate.law <= self._tolerance:
+                self.passes.append(passes)
+                return whole, judged
+            used = there
+        raise _tell_uplift(base, f"the crack still grows after {WATER} passes")
+
+    def _solve_passes(self, base: StepProblem, joint: JointStep) -> tuple[StepProblem, Certified]:
+        """Return the step for r' with its strength, and its certified answer. Collective.
+
+        Args:
+            base: the step without its joint.
+            joint: at the beginning of the step.
         """
         used = joint.guess(base)
         if not joint.implicit:
@@ -233,6 +283,20 @@ class JointSolver:
             f"step {base.k} at t = {base.t:.6g} s: after {MOST} passes the strength of the joint "
             f"still changes by {lag:.1e} of the largest: {self._advice}"
         )
+
+
+def _tell_uplift(base: StepProblem, what: str) -> StepFailure:
+    """Return the error of a static stage that water lifts.
+
+    Args:
+        base: the stage.
+        what: what the passes have come to.
+    """
+    return StepFailure(
+        f"step {base.k} at t = {base.t:.6g} s: uplift: the water follows the opening of the joint, "
+        f"and {what}: lower the level, add weight or drains, or march in time, where inertia "
+        "decides"
+    )
 
 
 def _without_joint(step: StepProblem) -> StepProblem:

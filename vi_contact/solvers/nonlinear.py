@@ -56,6 +56,7 @@ MARGIN = 4.0  # passes that a tangent needs itself
 # The share of the reference in tangents, each tried where the one before was of no use. All but the
 # first are braced at the contact.
 SHARES = (0.0, 0.0, 0.1, 0.4)
+TURNED = 0.5  # half the angle of a step that is too long for anything else
 BRACE = 10.0  # of the stiffness of a closed point: that of a spring which braces a tangent there
 
 
@@ -198,10 +199,13 @@ class NonlinearSolver:
             raise StepFailure(
                 f"{_name(step)} begins where its internal force is NaN or infinite: {self._advice}"
             )
+        d = forces.find_start()
         start = Place(step.guess, step.b, step.active)
+        if d is not None:
+            start = Place(d, forces.find_rest(d), step.active)
         walk = Walk(step, forces, start, start, self._reference, self._make_acceleration())
         # The reference of a body that has turned is of no use: its passes go with a tangent.
-        walk.tangent_due = forces.stage.between is not None
+        walk.tangent_due = forces.turns
         return walk
 
     def _go(self, walk: Walk, passes: Passes[Pass]) -> Iterator[Pass]:
@@ -329,14 +333,20 @@ class NonlinearSolver:
             rest = walk.forces.find_rest(d)
             if self._is_finite(rest):
                 walk.here = Place(d, rest, end.active)
-        walk.tangent_due = not walk.refused and self._wants_tangent(passes)
+        walk.tangent_due = not walk.refused and self._wants_tangent(walk, passes)
 
-    def _wants_tangent(self, passes: Passes[Pass]) -> bool:
+    def _wants_tangent(self, walk: Walk, passes: Passes[Pass]) -> bool:
         """Tell whether the passes that are still expected cost more than a new factor.
 
-        With the rate of the best pass so many are expected: log(aim/residual) / log(rate).
+        With the rate of the best pass so many are expected: log(aim/residual) / log(rate). That of
+        a body that turns is about half the angle of the step, wherever its tangent is taken: a new
+        one is no better, unless the rate is worse than that.
+
+        Args:
+            walk: so far.
+            passes: what they have shown.
         """
-        if passes.rate == 1.0:
+        if passes.rate == 1.0 or (walk.forces.turns and passes.rate < TURNED):
             return False
         left = ln(passes.goal / passes.least) / ln(passes.rate)
         return left > self._cost + MARGIN

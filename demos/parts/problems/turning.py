@@ -3,6 +3,7 @@
 - ``spin_block``: a free block that spins.
 - ``rock_block``: a block that leans on a corner, and is let go.
 - ``shake_column``: a free-standing column on a ground that moves.
+- ``pulse_column``: how far one turns under a pulse, beside the rigid block.
 
 Beside them stands the rigid block (Housner, Bull. Seism. Soc. Am. 53, 1963), at any angle: R is
 half its diagonal, alpha = atan(width/height), p² = 3g/4R, and about its corner
@@ -27,6 +28,8 @@ from vi_contact.meshes.block import BlockMesh
 
 GRAVITY = 9.81  # m/s²
 STONE = vc.SaintVenantKirchhoff(E=1e8, nu=0.0, rho=2000.0)  # soft, so that 50 steps see its waves
+SECONDS = 2.0  # that a column is followed after a pulse
+FALLEN = 1.0  # rad, from which on it falls
 ROUGH = vc.Coulomb(5.0)  # corners do not slide, as those of the rigid block
 
 
@@ -227,6 +230,33 @@ def shake_column(
     return vc.ContactProblem(
         system, make_floor(system), friction=friction, excitation=excitation, **more
     )
+
+
+def pulse_column(
+    comm: Any, block: RigidBlock, strength: float, duration: float
+) -> tuple[float, float]:
+    """Return how far a column and the rigid block turn under half a sine [rad]. Collective.
+
+    They are followed for two seconds, or until they have fallen (``FALLEN``).
+
+    Args:
+        comm: the ranks.
+        block: the column.
+        strength: of the pulse, over the acceleration g tan(alpha) that lifts the base off.
+        duration: of the pulse [s].
+    """
+    amplitude = strength * GRAVITY * block.width / block.height
+    pulse = vc.HalfSine(amplitude=-amplitude, duration=duration)
+    rigid = block.fall_over(lambda t: -pulse.acceleration(t), SECONDS)
+    stone = vc.SaintVenantKirchhoff(E=1e9, nu=0.0, rho=2000.0)
+    problem = shake_column(comm, block, pulse, material=stone, divisions=(1, 4))
+    tilt = 0.0
+    for state, _ in vc.march(problem, dt=0.01, t_end=SECONDS):
+        now = find_tilt(problem, state)
+        tilt = max(tilt, now)
+        if tilt > FALLEN or now < -0.5 * block.alpha:
+            break
+    return tilt, float(rigid.y[0].max())
 
 
 def make_floor(system: Any) -> Any:

@@ -58,6 +58,7 @@ from .initial_strains import InitialStrain, InitialStrains
 from .linear_forms import AnyLoad, LinearForm, Loads
 from .loads import BodyForce, Prescribed, Traction, evaluate
 from .own_forms import Forms, OwnForms
+from .reservoir import Reservoir, assemble_water, list_pressures
 from .space import FemSpace, translations
 from .ties import Tied
 from .turning_forms import TurningForms
@@ -85,6 +86,7 @@ def assemble(
     tied: Tied | Sequence[Tied] = (),
     dashpots: Dashpots | Sequence[Dashpots] = (),
     loads: Loads = (),
+    reservoir: Reservoir | None = None,
     damping: Damping | None = None,
     initial_displacement: Annotated[Initial, Unit("m")] = None,
     initial_velocity: Annotated[Initial, Unit("m/s")] = None,
@@ -122,6 +124,7 @@ def assemble(
         damping: NoDamping() by default, MassProportional(c) (eq. 7), Rayleigh, KelvinVoigt, or
             DampingRatio, which alone reads the xi of materials.
         loads: tractions (eqs. 4, 6), body forces, InitialStrain, LinearForm.
+        reservoir: water before a face, ``Reservoir``: its pressure is a load and its mass is in M.
         base_inertia: whether the inertia load of a ground motion counts the mass that elements
             share with prescribed nodes. True is right for motions relative to the ground; False is
             the load of docs/start/first_wall.md.
@@ -160,6 +163,7 @@ def assemble(
             "tied": tied,
             "dashpots": dashpots,
             "loads": loads,
+            "reservoir": reservoir,
             "damping": damping,
             "initial_displacement": initial_displacement,
             "initial_velocity": initial_velocity,
@@ -190,7 +194,12 @@ def assemble(
     )
     check_initial(mesh, displacement=initial_displacement, velocity=initial_velocity)
     conditions = gather_conditions(
-        mesh, clamped=clamped, prescribed=prescribed, tied=tied, dashpots=dashpots, loads=loads
+        mesh,
+        clamped=clamped,
+        prescribed=prescribed,
+        tied=tied,
+        dashpots=dashpots,
+        loads=(*as_tuple(loads), *list_pressures(reservoir)),
     )
 
     # unknowns: nodes, which of their components are held or tied, and the elimination of these
@@ -240,7 +249,8 @@ def assemble(
     v0 = _evaluate_initial(space, "initial velocity", initial_velocity)
 
     # the equations of the free unknowns, with the loads of prescribed motions and of boundaries
-    reduced = _reduce(body, absorbers, algebra, base_inertia=base_inertia)
+    water = assemble_water(reservoir, space, section.thickness)
+    reduced = _reduce(body, absorbers, algebra, base_inertia=base_inertia, water=water)
     M = reduced.M
     base_mass = None
     if reduced.momenta is not None:
@@ -360,6 +370,7 @@ def _reduce(
     algebra: PetscAlgebra,
     *,
     base_inertia: bool,
+    water: Any = None,
 ) -> _Reduced:
     """Assemble K, C and M of all components, and eliminate those that are held or tied. Collective.
 
@@ -368,6 +379,7 @@ def _reduce(
         absorbers: matrices of its absorbing boundaries.
         algebra: how the matrices are stored.
         base_inertia: whether ``momenta`` are asked for.
+        water: mass of a reservoir (PETSc), which neither weighs nor rises with the ground.
     """
     space = body.space
     elimination = space.elimination
@@ -388,8 +400,36 @@ def _reduce(
     momenta = None
     if base_inertia:
         momenta = np.column_stack([elimination.pull(PetscMatrix(mass) @ r) for r in directions])
+    if water is not None:
+        mass = _add_water(mass, water, momenta, elimination, directions)
     M, inertial = _eliminate(mass, elimination, algebra, motions[2])
     return _Reduced(M, C, K, elastic, viscous, inertial, momenta)
+
+
+def _add_water(
+    mass: Any,
+    water: Any,
+    momenta: Array | None,
+    elimination: Elimination,
+    directions: Sequence[Array],
+) -> Any:
+    """Return M + M_w (PETSc), and add the horizontal momenta of the water. Collective.
+
+    Args:
+        mass: M of the body; it is destroyed.
+        water: M_w; it is destroyed.
+        momenta: (n, d) of the body, changed; None where nobody asks.
+        elimination: takes forces to the free unknowns.
+        directions: unit translations of all components.
+    """
+    if momenta is not None:
+        for column, r in enumerate(directions[:-1]):  # the last axis points up
+            momenta[:, column] += elimination.pull(PetscMatrix(water) @ r)
+    algebra = PetscAlgebra(mass.comm)
+    whole = as_petsc(algebra.combine([(1.0, PetscMatrix(mass)), (1.0, PetscMatrix(water))])).mat
+    mass.destroy()
+    water.destroy()
+    return whole
 
 
 def _assemble_damping(body: ElasticForms, absorbers: Sequence[DashpotMatrix]) -> Any:

@@ -8,7 +8,6 @@ The derivative is UFL's. Forms are compiled once, and assembled anew at every u.
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 import ufl
 
 from ...core.algebra import Array, Matrix, total
@@ -49,6 +48,7 @@ class InternalForms:
             )
         self._space = space
         self._u = compat.function(space.V)
+        self._forces = compat.function(space.V)
         v = ufl.TestFunction(space.V)
         force = form_of(NAME, lambda v: internal(self._u, v), space, v)
         stored = form_of("Forms: energy", lambda: energy(self._u), space)
@@ -82,10 +82,8 @@ class InternalForms:
 
     def _assemble_force(self, form: Any) -> Array:
         """Return a linear form on the free unknowns (n,) [N]. Collective."""
-        vector = compat.assemble_vector(form)
-        full = np.array(vector.array_r)
-        vector.destroy()
-        return self._space.pull(full)
+        compat.assemble_into(form, self._forces)
+        return self._space.pull(self._forces.x.array[: self._space.free.size].copy())
 
     def _assemble_tangent(self, form: Any) -> Matrix:
         """Return a bilinear form on the free unknowns (n, n) [N/m]. Collective."""

@@ -11,9 +11,9 @@ Because C1 - C0 = 2 sym(½ (F0 + F1)ᵀ (F1 - F0)), its work is that of the stor
     (u1 - u0)·p̄ = ∫ ½ S̄ : (C1 - C0) = W(u1) - W(u0)
 
 and because S̄ is symmetric, forces of the middle place have no moment: energy, momentum and spin
-are kept by any length of step. For Saint-Venant and Kirchhoff's law S̄ is the mean of both stresses.
-Other energies take Gauss's rule in s: an average of dW/dC has no 0/0 where little strains, as the
-quotient of Gonzalez (1996) has, which loses all digits in stiff bodies.
+are kept by any length of step. For Saint-Venant and Kirchhoff's law S̄ is the mean of both
+stresses. Other energies take Gauss's rule in s: an average of dW/dC has no 0/0 where little
+strains, as the quotient of Gonzalez (1996) has, which loses all digits in stiff bodies.
 
 Sources: Simo and Tarnow, Z. angew. Math. Phys. 43 (1992) 757-792; Gonzalez, Comput. Methods Appl.
 Mech. Eng. 190 (2000) 1763-1783; the average along s: McLachlan, Quispel and Robidoux, Phil. Trans.
@@ -37,6 +37,7 @@ from .forms import ElasticForms
 from .hyperelastic import TURNING, find_energy
 from .initial_strains import InitialStrain
 from .internal_forms import InternalForms
+from .rigid_motion import RigidMotion
 from .space import FemSpace
 
 GAUSS = 4  # points in s: what they leave of W(u1) - W(u0) is round-off for strains of 0.1 in a step
@@ -109,6 +110,9 @@ class TwoEndForms(InternalForms):
         about = h * ufl.inner(turned, ufl.grad(v)) * dx
         self._between = on_all(space.comm, "p̄", lambda: space.compile_form(between))
         self._about = on_all(space.comm, "the derivative of p̄", lambda: space.compile_form(about))
+        body = space.body_of_node
+        bodies = 1 + int(largest(space.comm, body.max(initial=-1)))
+        self._motion = RigidMotion(body, bodies, space.comm)
 
     def _put_both(self, u0: Array, u1: Array) -> None:
         """Write the free unknowns (n,) of both ends into the Functions. Collective."""
@@ -125,6 +129,13 @@ class TwoEndForms(InternalForms):
         """Return about how p̄ changes with ½ (u0 + u1), (n, n) [N/m], symmetric. Collective."""
         self._put_both(u0, u1)
         return self._assemble_tangent(self._about)
+
+    def turn_on(self, u0: Array, u1: Array) -> Array:
+        """Return where u1 (n,) would be if bodies turned on their way from u0. Collective."""
+        space = self._space
+        u = space.expand(u0, 0.0)
+        way = space.expand(u1, 0.0) - u
+        return u0 + space.restrict(self._motion.turn_on(space.points + u, way))
 
 
 def _restrict(S: Any, d: int) -> Any:

@@ -22,10 +22,10 @@ from ...core.checks import check_word, instance
 from ...core.errors import StepFailure
 from ...core.problem import ContactProblem
 from ...core.quantities import Between, NotNegative, Positive
+from ...core.sizes import refuse_dense
 from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
-from ...core.sizes import refuse_dense
-from ..certified import check_laws
+from ..certified import check_laws, refuse_rates
 from ..petsc import PETSc
 from ..volume.failures import make_petsc_failure
 from ..volume.options import OptionLayers
@@ -105,6 +105,7 @@ class Iterative:
                 surface.total * width,
                 instead="Condensed(), which has a sparse one",
             )
+        refuse_rates("Iterative()", problem)
         check_laws("Iterative()", problem)
 
     def prepare(
