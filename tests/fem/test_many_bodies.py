@@ -570,7 +570,6 @@ def test_frictionless_corners_stay_a_choice():
 @pytest.mark.parametrize(
     ("how", "sentence"),
     [
-        ({"solver": vc.Iterative()}, r"Iterative\(\) needs an unknown for each contact condition"),
         ({"solver": vc.Volume()}, "needs an unknown for each contact condition.*use Condensed"),
         ({"scheme": vc.HHT(-0.1)}, "remembers reactions as forces on the unknowns"),
         ({"scheme": vc.Houbolt()}, "remembers reactions as forces on the unknowns"),

@@ -25,10 +25,8 @@ from scipy.linalg import lapack
 from ..core.algebra import Array, Comm, EffectiveMatrix, Indices, Mask
 from ..core.surfaces import ContactSurface
 from ..core.traces import Traces
+from .bodies import CondensedBodies, find_still
 from .contact_last import ContactLast
-
-ROUNDING = 2e-15  # of the largest free motion, as sums of reactions leave it
-AT_REST = 1e-12  # the same of all unknowns at once
 
 
 def condense(
@@ -259,10 +257,7 @@ class CondensedTraces:
         """
         force = self._Bt @ r
         x = self._free - self._unknowns.flexibility @ force
-        # Where all are at rest what is left of them is rounding of the method too.
-        size = np.abs(self._free).max(initial=0.0)
-        is_at_rest = np.abs(x).max(initial=0.0) <= AT_REST * size
-        still = np.abs(x) <= (AT_REST if is_at_rest else ROUNDING) * size
+        still = find_still(x, self._free)
         return self._unknowns.answer(force, still, np.zeros(len(still)))
 
     def respond(self, r: Array) -> Array:
@@ -270,4 +265,4 @@ class CondensedTraces:
         return self._unknowns.respond(self._Bt @ r)
 
 
-Condensation = CondensedLast | CondensedTwice | CondensedTraces
+Condensation = CondensedLast | CondensedTwice | CondensedTraces | CondensedBodies

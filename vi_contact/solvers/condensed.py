@@ -23,6 +23,7 @@ from functools import cached_property
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+import scipy.sparse as sp
 
 from ..core.algebra import Array, EffectiveMatrix, Mask, freeze
 from ..core.checks import instance, provides
@@ -31,6 +32,7 @@ from ..core.sizes import refuse_dense
 from ..core.step import Answers, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
 from ..core.timing import report_time
+from ..kernels.bodies import CondensedBodies
 from ..kernels.condensation import Condensation, CondensedLast, condense
 from .certified import check_laws
 from .condensed_passes import CondensedPasses
@@ -40,6 +42,8 @@ from .friction.problem import FrictionMethod, check_inner_method
 from .friction.slip_rate import RateIteration
 from .normal.active_set import ActiveSet, PreparedSets
 from .normal.lcp import LCPResult
+
+SPARSE = 1000  # rows of G of conditions that are traces, from which on a sparse G is faster
 
 
 class SmallMethod(Protocol):
@@ -99,7 +103,8 @@ class Condensed:
         methods: list[object] = [self.method]
         if problem.frictional:
             unknowns = surface.total * (1 + surface.tangents.shape[1])
-            refuse_dense(f"Condensed() with {problem.friction}", unknowns)
+            if not self.takes_bodies(surface):
+                refuse_dense(f"Condensed() with {problem.friction}", unknowns)
             methods.append(self.friction_method)
         else:
             refuse_dense("Condensed()", surface.total)
@@ -121,6 +126,18 @@ class Condensed:
         """
         refuse_dense("Condensed()", surface.total)
         return PreparedCondensed(self, A, surface, scale)
+
+    def takes_bodies(self, surface: ContactSurface) -> bool:
+        """Say whether steps with friction are condensed body by body, with a sparse G. Collective.
+
+        That is where many conditions share unknowns, as those of a wall of stones do.
+
+        Args:
+            surface: the contact surface.
+        """
+        if surface.traces is None or not isinstance(self.friction_method, FrictionNewton):
+            return False
+        return surface.total * (1 + surface.tangents.shape[1]) >= SPARSE
 
 
 class NormalProblem(NamedTuple):
@@ -165,14 +182,24 @@ class PreparedCondensed:
     def _condense(self, *, frictional: bool) -> Condensation:
         """Return A condensed, with the compliance of the support in its flexibility."""
         surface = self._surface
-        condensed = condense(self._A, surface, frictional=frictional)
+        traces = surface.traces
+        condensed: Condensation
+        if traces is not None and self._settings.takes_bodies(surface):
+            condensed = CondensedBodies(self._A, traces, frictional=frictional)
+        else:
+            condensed = condense(self._A, surface, frictional=frictional)
 
         # A spring is in series with the body: its compliance adds to the flexibility of its normal
         # unknown. Contact unknowns stand condition by condition, the normal one first.
         compliance = surface.everywhere(surface.compliance) / self._scale
         unknowns_of_a_condition = len(condensed.movable) // max(surface.total, 1)
         normal = np.arange(surface.total) * unknowns_of_a_condition
-        condensed.flexibility[normal, normal] += compliance
+        if isinstance(condensed, CondensedBodies):
+            condensed.add_to_diagonal(normal, compliance)
+            if not frictional:  # methods without friction take an array
+                condensed.flexibility = condensed.flexibility.toarray()
+        else:
+            condensed.flexibility[normal, normal] += compliance
         return condensed
 
     @property
@@ -235,21 +262,25 @@ class PreparedCondensed:
         springs = surface.everywhere(surface.compliance) / self._scale
         if frictional and surface.total:
             friction = self.friction
-            compliance = np.zeros(len(friction.delassus))
+            G: Any = friction.delassus
+            if sp.issparse(G):  # the law of a joint needs its inverse
+                refuse_dense("a joint in Condensed()", G.shape[0], instead="friction alone")
+                G = G.toarray()
+            compliance = np.zeros(len(G))
             compliance[:: len(compliance) // surface.total] = springs
 
             def rub(step: StepProblem, free: Array, near: Array | None) -> Any:
                 """Solve the small problem with friction."""
                 answer, held, values = friction.reactions(step, free, self._rigid, near)
                 q = values.reshape(answer.r.shape) - free.reshape(answer.r.shape)
-                moved = q + (friction.delassus @ answer.r.ravel()).reshape(q.shape)
+                moved = q + (G @ answer.r.ravel()).reshape(q.shape)
                 found = (answer.r, moved, answer.active, answer.stick, held, values)
                 return (*found, answer.iterations)
 
             return CondensedPasses(
                 friction.condensed,
                 rub,
-                friction.delassus,
+                G,
                 compliance,
                 surface,
                 self._rigid,

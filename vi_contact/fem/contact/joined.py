@@ -29,7 +29,7 @@ def joined_surfaces(*surfaces: ContactSurface) -> ContactSurface:
     (``with_frictionless_corners``); in space it rubs along the edge then, with the normal force of
     the first of them: name the surface that carries the body first. A node may also be in several
     pairs, on side 1 of one and on side 2 of another, or face several bodies along one direction:
-    its conditions are traces then (``core.traces``), which ``Condensed`` solves.
+    its conditions are traces then (``core.traces``), not for ``Volume``.
 
     Raises:
         InputError: surfaces of different systems; a boundary or a pair that is listed twice, or a

@@ -39,7 +39,8 @@ class CondensedFriction:
 
     Attributes:
         condensed: A, condensed.
-        delassus: G (m d, m d).
+        small: what solves the small problem.
+        delassus: G (m d, m d), an array, or sparse (``kernels.bodies``).
     """
 
     def __init__(
@@ -68,10 +69,17 @@ class CondensedFriction:
         d = 1 + surface.tangents.shape[1]
         prescribed = np.flatnonzero(~condensed.movable)
         normal = prescribed // d * d
-        self.delassus[prescribed, prescribed] = self.delassus.diagonal()[normal]
+        soft = self.delassus.diagonal()[normal]
+        if sp.issparse(self.delassus):
+            entries = (soft, (prescribed, prescribed))
+            self.delassus = sp.csr_matrix(
+                self.delassus + sp.coo_matrix(entries, shape=self.delassus.shape)
+            )
+        else:
+            self.delassus[prescribed, prescribed] = soft
         bilateral = surface.everywhere(surface.bilateral)
         if surface.traces is None:
-            self._small: Any = method.prepare(self.delassus, bilateral)
+            self.small: Any = method.prepare(self.delassus, bilateral)
         else:
             # What a spring carries shows in its length, as if it were an unknown of its own.
             soft = surface.everywhere(surface.compliance) > 0.0
@@ -80,7 +88,7 @@ class CondensedFriction:
                 (np.ones(len(rows)), (rows, np.arange(len(rows)))), shape=(d * len(soft), len(rows))
             )
             B = sp.csr_matrix(sp.hstack([surface.traces.every, lengths]))
-            self._small = Hyperstatic(
+            self.small = Hyperstatic(
                 method,
                 self.delassus,
                 bilateral,
@@ -141,7 +149,7 @@ class CondensedFriction:
         def solve(mu: Array, before: FrictionResult | None) -> FrictionResult:
             """Solve the small problem of all conditions with coefficients mu."""
             guess = (active if near is None else near) if before is None else before.r
-            return self._small.solve(q, cohesion, mu, guess)
+            return self.small.solve(q, cohesion, mu, guess)
 
         def slip_of(answer: FrictionResult) -> Array:
             """Return the slip of the conditions of this rank."""

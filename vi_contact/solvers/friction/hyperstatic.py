@@ -15,20 +15,26 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from ...core.algebra import Array, Mask, max_abs
 from ...core.errors import StepFailure
 from .enumeration import MOST_CONDITIONS, find_by_states
+from .kept_factor import KeptFactor
 from .least_forces import States, split_least
 from .nsgs import make_sweep
 from .problem import STILL, FrictionMethod, FrictionResult, ScaledDelassus, ScaledProblem
 from .rings import Ring
+from .sparse import SparseDelassus, SparseNewton
 
 SHIFT = 1e-3  # σ over what conditions give way alone: larger takes more passes, smaller more digits
 PASSES = 30
 SLOW = 0.5  # a pass that leaves more of the residual has reached rounding
 TOLERANCE = 1e-8  # of the residual of r = 0, above which an answer is refused; passes go on below
 SWEEPS = (10, 100, 1000)  # before another attempt
+FEW_SWEEPS = (1, 3, 10, 30)  # the same with a sparse G, where a sweep takes as long as a step
+
+Walked = tuple[Array, int, list[float]]  # reactions, iterations, residuals on the way
 
 
 class Hyperstatic:
@@ -37,7 +43,7 @@ class Hyperstatic:
     def __init__(
         self,
         method: FrictionMethod,
-        G: Array,
+        G: Any,
         bilateral: Mask,
         *,
         rings: list[Ring],
@@ -48,7 +54,7 @@ class Hyperstatic:
 
         Args:
             method: for the small problems.
-            G: (m d, m d) Delassus operator.
+            G: (m d, m d) Delassus operator, an array, or sparse with FrictionNewton.
             bilateral: (m,) which conditions may pull.
             rings: groups whose traces depend on one another.
             weights: (m,) lengths or areas.
@@ -57,16 +63,38 @@ class Hyperstatic:
         self._method = method
         self._rings = rings
         self._weights = weights
+        self._movable = movable.reshape(len(bilateral), -1)
+        self._last: Array | None = None
+        self._is_sparse = sp.issparse(G)
+        if self._is_sparse:
+            self._delassus: ScaledDelassus = SparseDelassus(G, bilateral)
+            self._small: Any = SparseNewton(method, G, self._make_sparse_shift(G), bilateral)
+            return
         self._delassus = ScaledDelassus(G, bilateral, unsymmetric=True)
-        m = len(bilateral)
-        self._movable = movable.reshape(m, -1)
         self._strength = 0.0
         if rings:
             # What conditions give way while all others are held, as springs in series with them.
             largest = self._add_shift(G, max_abs(G))
             alone = 1.0 / np.diag(np.linalg.inv(largest))
             self._strength = SHIFT * float(np.median(alone[movable]))
-        self._small: Any = method.prepare(self._add_shift(G, self._strength), bilateral)
+        self._small = method.prepare(self._add_shift(G, self._strength), bilateral)
+
+    @property
+    def kept(self) -> KeptFactor:
+        """Return the factor of linear problems, of a sparse G."""
+        kept: KeptFactor = self._small.kept
+        return kept
+
+    def _find_alone_in_rings(self, G: sp.csr_matrix) -> float:
+        """Return what conditions of rings give way while all others of their ring are held."""
+        largest = max_abs(G.data)
+        alone = []
+        for ring in self._rings:
+            places = ring.places(self._movable.shape[1])
+            block = G[places][:, places].toarray() + largest * ring.null @ ring.null.T
+            moves = self._movable[ring.conditions].ravel()
+            alone.append((1.0 / np.diag(np.linalg.inv(block)))[moves])
+        return float(np.median(np.concatenate(alone)))
 
     def _add_shift(self, G: Array, strength: float) -> Array:
         """Return G + strength Z Zᵀ, a copy."""
@@ -75,6 +103,20 @@ class Hyperstatic:
             places = ring.places(self._movable.shape[1])
             shifted[np.ix_(places, places)] += strength * ring.null @ ring.null.T
         return shifted
+
+    def _make_sparse_shift(self, G: sp.csr_matrix) -> sp.csr_matrix:
+        """Return σ Z Zᵀ, sparse."""
+        rows, columns, values = [], [], []
+        strength = SHIFT * self._find_alone_in_rings(G) if self._rings else 0.0
+        for ring in self._rings:
+            places = ring.places(self._movable.shape[1])
+            rows.append(np.repeat(places, len(places)))
+            columns.append(np.tile(places, len(places)))
+            values.append(strength * (ring.null @ ring.null.T).ravel())
+        if not rows:
+            return sp.csr_matrix(G.shape)
+        entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+        return sp.csr_matrix(sp.coo_matrix(entries, shape=G.shape))
 
     def _shift(self, r: Array) -> Array:
         """Return σ Z Zᵀ r (m, d) of reactions (m, d)."""
@@ -101,25 +143,54 @@ class Hyperstatic:
         """
         step = self._delassus.problem(q, cohesion, slope)
 
-        def solve_shifted(before: Array, start: Array | Mask | None) -> FrictionResult:
-            moved = q - self._shift(before)
-            found: FrictionResult = self._small.solve(moved, cohesion, slope, start)
-            return found
+        def walk(before: Array, start: Array | Mask | None, count: int) -> Walked:
+            """Go from reactions before, and a guess, to where the shift has no effect."""
+            if self._is_sparse:
+                last = self._small.solve(step, start)
+                return last.r, count + last.iterations, list(last.history)
 
-        r, count, history = self._search(step, solve_shifted, guess)
-        return self._finish(step, r, count, history)
+            def solve_shifted(before: Array, start: Array | Mask | None) -> FrictionResult:
+                moved = q - self._shift(before)
+                found: FrictionResult = self._small.solve(moved, cohesion, slope, start)
+                return found
+
+            return self._walk(step, solve_shifted, before, start, count)
+
+        if self._is_sparse:
+            guess = self._scale_last(step, guess)
+        r, count, history = self._search(step, walk, guess)
+        found = self._finish(step, r, count, history)
+        self._last = found.r
+        return found
+
+    def _scale_last(self, step: ScaledProblem, guess: Array | Mask | None) -> Array | Mask | None:
+        """Return the last reactions [N], or the guess where they do not suit.
+
+        Hundreds of states must be found in a wall, and those of the last reactions are nearly
+        right. The factor of the least energy ½ rᵀG r + qᵀr makes them fit corrections too, which
+        ask for a small share of all reactions.
+        """
+        if self._last is None:
+            return guess
+        r = step.admissible(self._last / self._delassus.scale)
+        carried = r != 0.0
+        energy = float(np.vdot(step.product(r), r))
+        work = -float(step.q[carried] @ r[carried])
+        if not (0.0 < energy < np.inf and 0.0 < work < np.inf):
+            return guess
+        return np.asarray(self._last * (work / energy))
 
     def _search(
         self,
         step: ScaledProblem,
-        solve_shifted: Callable[[Array, Array | Mask | None], FrictionResult],
+        walk: Callable[[Array, Array | Mask | None, int], Walked],
         guess: Array | Mask | None,
-    ) -> tuple[Array, int, list[float]]:
+    ) -> Walked:
         """Return reactions (m, d), scaled, the number of iterations and their residuals.
 
         Args:
             step: the problem.
-            solve_shifted: solves that with a shift from reactions before, and a guess.
+            walk: solves from reactions before, a guess, and the number of iterations so far.
             guess: contact set or reactions to start from.
         """
         count = 0
@@ -127,9 +198,9 @@ class Hyperstatic:
         start = guess
         before = np.zeros_like(step.q)
         failure = None
-        for sweeps in (*SWEEPS, 0):
+        for sweeps in (*(FEW_SWEEPS if self._is_sparse else SWEEPS), 0):
             try:
-                return self._walk(step, solve_shifted, before, start, count)
+                return walk(before, start, count)
             except StepFailure as error:
                 failure = error
             if not sweeps:
@@ -158,7 +229,7 @@ class Hyperstatic:
         before: Array,
         start: Array | Mask | None,
         count: int,
-    ) -> tuple[Array, int, list[float]]:
+    ) -> Walked:
         """Return reactions (m, d), scaled, where the shift has no effect any more.
 
         Args:

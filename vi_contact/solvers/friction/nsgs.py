@@ -57,7 +57,6 @@ class NSGS(Settings):
 def make_sweep(step: ScaledProblem) -> Callable[[Array], Array]:
     """Return one sweep over all nodes of a problem: r (m, d) -> r."""
     d = step.delassus.dimension
-    matrix = step.delassus.matrix
     nodes = [_Node(step, i) for i in range(step.count)]
 
     def sweep(r: Array) -> Array:
@@ -66,7 +65,7 @@ def make_sweep(step: ScaledProblem) -> Callable[[Array], Array]:
         for i, node in enumerate(nodes):
             rows = slice(i * d, (i + 1) * d)
             flat[rows] = 0.0
-            flat[rows] = node.solve(step.q[i] + matrix[rows] @ flat)
+            flat[rows] = node.solve(step.q[i] + step.delassus.product_at(i, flat))
         return flat.reshape(r.shape)
 
     return sweep
@@ -77,9 +76,7 @@ class _Node:
 
     def __init__(self, step: ScaledProblem, i: int) -> None:
         """Take the block of node i, and eliminate its normal reaction from the tangential rows."""
-        d = step.delassus.dimension
-        rows = slice(i * d, (i + 1) * d)
-        block = step.delassus.matrix[rows, rows]
+        block = step.delassus.block_at(i)
         self.normal = float(block[0, 0])
         self.coupling = block[0, 1:]  # of w_n to r_t
         self.pushed = block[1:, 0]  # of w_t to r_n: the same, unless G is not symmetric

@@ -295,6 +295,16 @@ class ScaledDelassus:
             return np.asarray(r[carried] @ self.matrix[carried])
         return np.asarray(blas.dsymv(1.0, self.matrix.T, r))  # reads half of it
 
+    def product_at(self, i: int, r: Array) -> Array:
+        """Return the rows (d,) of node i of G r, r (m d,)."""
+        d = self.dimension
+        return np.asarray(self.matrix[i * d : (i + 1) * d] @ r)
+
+    def block_at(self, i: int) -> Array:
+        """Return the block (d, d) of node i on the diagonal of G."""
+        rows = slice(i * self.dimension, (i + 1) * self.dimension)
+        return np.asarray(self.matrix[rows, rows])
+
     def make_short(self) -> ShortMatrices:
         """Return what the compiled sweeps read, in single precision."""
         G = self.matrix.astype(np.float32)

@@ -22,9 +22,10 @@ from ...core.checks import check_word, instance
 from ...core.errors import StepFailure
 from ...core.problem import ContactProblem
 from ...core.quantities import Between, NotNegative, Positive
+from ...core.sizes import refuse_dense
 from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
-from ..certified import check_laws, refuse_rates, refuse_traces
+from ..certified import check_laws, refuse_rates
 from ..petsc import PETSc
 from ..volume.failures import make_petsc_failure
 from ..volume.options import OptionLayers
@@ -48,6 +49,7 @@ from .preconditioners import (
 )
 from .projected_gradients import descend, estimate_largest_eigenvalue
 from .search import Search, search_set
+from .traced import GradientFactor, TracedSteps
 
 log = logging.getLogger(__name__)
 AUTO = "auto"
@@ -95,7 +97,14 @@ class Iterative:
 
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError for friction without a tangential direction, or of a wrong length."""
-        refuse_traces("Iterative()", problem.surface)
+        surface = problem.surface
+        if surface.traces is not None:
+            width = 1 + surface.tangents.shape[1] if problem.frictional else 1
+            refuse_dense(
+                "Iterative() with conditions that share unknowns",
+                surface.total * width,
+                instead="Condensed(), which has a sparse one",
+            )
         refuse_rates("Iterative()", problem)
         check_laws("Iterative()", problem)
 
@@ -152,6 +161,13 @@ class PreparedIterative:
             self._layers.excuse_known()  # they may be for a kind that another time step makes
         self._layers.refuse_unread(self._name, surface.comm)
 
+        # Conditions that share unknowns have none that could be held.
+        self._traced: TracedSteps | None = None
+        if surface.traces is not None:
+            factor = GradientFactor(A, nodewise, self._inverse, settings.patience)
+            self._traced = TracedSteps(A, surface, scale, factor, self._name)
+            return
+
         # The contact set, and how small residuals have to be.
         self._diagonal = np.array(self._blocks.getDiagonal().array_r)
         rows = self._layout.places[surface.owned]
@@ -193,6 +209,8 @@ class PreparedIterative:
         Raises:
             StepFailure: on all ranks, with the history of residuals, when there is no answer.
         """
+        if self._traced is not None:
+            return self._traced.solve(step)
         if self.kind != ICC or self._raised:
             return self._attempt(step)
         try:

@@ -1,0 +1,157 @@
+"""Walls of many stones: a sparse G of shared bodies gives what a dense one gives."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+pytest.importorskip("dolfinx")
+
+from mpi4py import MPI
+
+import vi_contact as vc
+from vi_contact import fem
+from vi_contact.kernels.bodies import CondensedBodies
+from vi_contact.meshes.masonry import MasonryMesh
+from vi_contact.solvers import condensed
+from vi_contact.solvers.friction.kept_factor import KeptFactor
+
+STONE = vc.LinearElastic(E=1e10, nu=0.2, rho=2400.0)
+
+
+def make_wall(comm: Any, depth: float | None = None, push: float = 6.0) -> vc.ContactProblem:
+    """A wall of two courses on shaking ground, in the plane or in space."""
+    d = 2 if depth is None else 3
+    cells = (4, 2) if depth is None else (2, 2, 2)
+    wall = MasonryMesh(stones=2, courses=2, height=0.2, depth=depth, ground=0.2, divisions=cells)
+    mesh, tags = fem.build_mesh(wall, comm)
+    weight = (0.0, -9.81 * STONE.rho) if d == 2 else (0.0, -9.81 * STONE.rho, 0.0)
+    ground = vc.Harmonic(amplitude=push, frequency=20.0, direction=(1.0,) + (0.0,) * (d - 1))
+    system = fem.assemble(
+        mesh,
+        STONE,
+        clamped=tags["ground_bottom"],
+        loads=fem.BodyForce(weight),
+        damping=vc.Rayleigh(alpha=0.0, beta=1e-4),
+    )
+    surface = fem.contact_pairs(system, within=1e-6)
+    assert surface.traces is not None
+    return vc.ContactProblem(
+        system,
+        surface,
+        friction=vc.Coulomb(0.3),
+        excitation=ground,
+        mass=vc.ConsistentMass(),
+    )
+
+
+def march(problem: vc.ContactProblem, steps: int, rows: int, patch: Any) -> tuple[Any, Any]:
+    """Steps with a sparse G from some rows on: the last state, and the solver."""
+    patch.setattr(condensed, "SPARSE", rows)
+    stepper = vc.Stepper(problem, solver=vc.Condensed())
+    for _ in range(steps):
+        trial = stepper.attempt(1e-3)
+        assert trial.report.certificate.worst < 1e-9
+        stepper.accept(trial)
+    solver: Any = next(iter(stepper.prepared.values())).first
+    return stepper.state, solver.friction
+
+
+@pytest.mark.parametrize("depth", [None, 0.2], ids=["plane", "space"])
+def test_a_sparse_g_gives_what_a_dense_one_gives(depth: Any, monkeypatch: Any) -> None:
+    """Two ways to one answer, forces of rings too: their least split is unique."""
+    problem = make_wall(MPI.COMM_WORLD, depth)
+    steps = 12 if depth is None else 4
+    sparse, friction = march(problem, steps, 0, monkeypatch)
+    dense, other = march(problem, steps, 10**9, monkeypatch)
+    assert sp.issparse(friction.delassus) and not sp.issparse(other.delassus)
+    G = other.delassus
+    assert np.allclose(friction.delassus.toarray(), G, rtol=0.0, atol=1e-12 * np.abs(G).max())
+    assert sparse.active.sum() == dense.active.sum()
+    for name in ("u", "v", "r_n", "r_t"):
+        one, two = getattr(sparse, name), getattr(dense, name)
+        size = MPI.COMM_WORLD.allreduce(np.abs(two).max(initial=0.0), MPI.MAX)
+        assert np.allclose(one, two, rtol=0.0, atol=1e-8 * size), name
+
+
+def test_equal_stones_share_a_factor(monkeypatch: Any) -> None:
+    """Whole stones, half stones and the ground are three shapes, on any number of ranks."""
+    problem = make_wall(MPI.COMM_WORLD)
+    _, friction = march(problem, 1, 0, monkeypatch)
+    shapes = friction.condensed.bodies.shapes
+    assert isinstance(friction.condensed, CondensedBodies)
+    assert sorted(len(shape.unknowns) for shape in shapes) == [1, 2, 3]
+
+
+def test_restarts_and_runs_agree(monkeypatch: Any) -> None:
+    """What is kept from step to step saves time, and changes answers by rounding alone."""
+    problem = make_wall(MPI.COMM_WORLD)
+    straight, _ = march(problem, 8, 0, monkeypatch)
+    half, _ = march(problem, 4, 0, monkeypatch)
+    stepper = vc.Stepper(problem, solver=vc.Condensed(), state=half)
+    for _ in range(4):
+        stepper.accept(stepper.attempt(1e-3))
+    size = MPI.COMM_WORLD.allreduce(np.abs(straight.u).max(initial=0.0), MPI.MAX)
+    assert np.allclose(stepper.state.u, straight.u, rtol=0.0, atol=1e-8 * size)
+
+
+@pytest.mark.serial
+def test_a_joint_takes_the_same_wall(monkeypatch: Any) -> None:
+    """The law of a joint needs an array of G, which is made of the sparse one."""
+    monkeypatch.setattr(condensed, "SPARSE", 0)
+    wall = make_wall(MPI.COMM_SELF)
+    joint = vc.laws.Joint(tension=2e3, opening=1e-3)
+    problem = vc.ContactProblem(
+        wall.system, wall.surface, joint=joint, mass=vc.ConsistentMass(), excitation=wall.excitation
+    )
+    reports = [report for _, report in vc.march(problem, dt=1e-3, steps=3, solver=vc.Condensed())]
+    assert max(report.certificate.worst for report in reports) < 1e-9
+
+
+@pytest.mark.serial
+def test_iterations_follow_the_rows_that_changed() -> None:
+    """k changed rows: at most k + 1 iterations, and the answer of a factor of its own."""
+    rng = np.random.default_rng(3)
+    n = 200
+    J = sp.csr_matrix(np.eye(n) * 4.0 + np.diag(np.ones(n - 1), 1) + np.diag(np.ones(n - 1), -1))
+    free = np.ones(n, dtype=bool)
+    marks = np.ones((n, 1))
+    kept = KeptFactor()
+    kept.solve(J, free, rng.normal(size=n), marks)
+    for k in (1, 5, 12):
+        changed = J.tolil()
+        rows = rng.choice(n, k, replace=False)
+        for row in rows:
+            changed[row] = 0.0
+            changed[row, row] = 1.0
+        states = marks.copy()
+        states[rows] = 0.0
+        right = rng.normal(size=n)
+        before = kept.iterations
+        x = kept.solve(sp.csr_matrix(changed), free, right, states)
+        assert x is not None and kept.factors == 1
+        assert kept.iterations - before <= k + 1
+        assert np.abs(changed @ x - right).max() < 1e-8 * np.abs(right).max()
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("depth", [None, 0.2], ids=["plane", "space"])
+def test_iterative_rubs_where_conditions_share_unknowns(depth: Any) -> None:
+    """The same answers as Condensed, whose factor is a sum of iterations here."""
+    pytest.importorskip("petsc4py")
+    problem = make_wall(MPI.COMM_WORLD, depth)
+    ends = []
+    for solver in (vc.Iterative("jacobi"), vc.Condensed()):
+        stepper = vc.Stepper(problem, solver=solver)
+        for _ in range(3):
+            trial = stepper.attempt(1e-3)
+            assert trial.report.certificate.worst < 1e-9
+            stepper.accept(trial)
+        ends.append(stepper.state)
+    for name in ("u", "v", "r_n", "r_t"):
+        one, two = (getattr(end, name) for end in ends)
+        size = MPI.COMM_WORLD.allreduce(np.abs(two).max(initial=0.0), MPI.MAX)
+        assert np.allclose(one, two, rtol=0.0, atol=1e-10 * size), name
