@@ -123,6 +123,11 @@ class DruckerPrager(YieldingMaterial):
         of_psi = 6.0 / (sqrt(3.0) * (3.0 + sign * t))
         return of_phi * s, of_phi * c, of_psi * t
 
+    @property
+    def symmetric(self) -> bool:
+        """Say whether tangents are symmetric: psi is phi."""
+        return self.psi == self.phi
+
     def weaken(self, factor: float) -> "DruckerPrager":
         """Return the material with c and tan phi over a factor, and psi at most that phi."""
         c, phi, psi = divide_strength(self.cohesion, self.phi, self.psi, factor)

@@ -95,6 +95,11 @@ class MohrCoulomb(YieldingMaterial):
         G = self.shear_modulus
         return self.bulk_modulus - 2.0 / 3.0 * G + 2.0 * G * np.eye(3)
 
+    @property
+    def symmetric(self) -> bool:
+        """Say whether tangents are symmetric: psi is phi."""
+        return self.psi == self.phi
+
     def weaken(self, factor: float) -> "MohrCoulomb":
         """Return the material with c and tan phi over a factor, and psi at most that phi."""
         c, phi, psi = divide_strength(self.cohesion, self.phi, self.psi, factor)

@@ -72,6 +72,11 @@ class YieldingMaterial:
         return LinearElastic(self.E, self.nu, self.rho, self.xi)
 
     @property
+    def symmetric(self) -> bool:
+        """Say whether the tangents of the law are symmetric, as those of flow along the normal."""
+        return True
+
+    @property
     def shear_modulus(self) -> float:
         """Return G = E / (2 (1 + nu)) [Pa]."""
         return self.E / (2.0 * (1.0 + self.nu))

@@ -7,8 +7,9 @@ u begins from it anew, so that a step that is thrown away leaves nothing behind.
 what the points know at u, and ``go_on`` makes the force of a body that stands there.
 
 Tangents of laws whose flow is not along the normal of the yield surface (psi < phi) are not
-symmetric. The matrix is made of their symmetric part: it only leads the iterations of a step, whose
-answer is certified without it, and all solvers for symmetric matrices stay.
+symmetric. Beside contact the matrix is made of their symmetric part: it only leads the iterations
+of a step, whose answer is certified without it, and all solvers for symmetric matrices stay. A body
+without contact takes the whole tangent.
 """
 
 from collections.abc import Mapping, Sequence
@@ -229,6 +230,16 @@ class YieldingForce:
         D = self._compute_tangents(self._points.strain(u) - self._strain)
         symmetric = 0.5 * (D + D.swapaxes(1, 2))
         return self._algebra.store(self._points.free_matrix(symmetric))
+
+    @property
+    def symmetric(self) -> bool:
+        """Say whether p' is a symmetric matrix: whether all laws flow along their normals."""
+        return all(part.law.symmetric for part in self._parts)
+
+    def whole_tangent(self, u: Array) -> Matrix:
+        """Return p'(u) (n, n) [N/m], which need not be symmetric. Collective."""
+        D = self._compute_tangents(self._points.strain(u) - self._strain)
+        return self._algebra.store(self._points.free_matrix(D))
 
     def dissipation(self, u: Array) -> float:
         """Return what the way to u dissipates [J], of all ranks. Collective."""

@@ -60,8 +60,8 @@ def at_points(problem: ContactProblem, state: State, name: str) -> tuple[Array, 
         problem: the problem of the state.
         state: of simulate, march, static_equilibrium or quasi_static of this problem.
         name: "stress" [Pa], tension positive, "equivalent_stress" [Pa] (von Mises),
-            "plastic_strain" √(2/3) |eps_p| of the strain that stays, or "mobilised_strength", from 0
-            to 1.
+            "plastic_strain" √(2/3) |eps_p| of the strain that stays, or "mobilised_strength", from
+            0 to 1.
 
     Returns:
         Places (k, d) [m] of the points of this rank's cells, cell by cell, and values there: (k,),
