@@ -24,7 +24,7 @@ import tempfile
 import time
 from array import array
 from collections import Counter
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from math import inf
 from pathlib import Path
 from types import SimpleNamespace
@@ -41,6 +41,7 @@ if importlib.util.find_spec("dolfinx_solver") is not None:
 # Gmsh sets a locale that obeys LANGUAGE
 os.environ |= {"COLUMNS": "100", "PYTHON_COLORS": "0", "LANGUAGE": "C"}
 
+CLONE = Path(__file__).resolve().parents[1]
 RANK = int(os.environ.get("OMPI_COMM_WORLD_RANK", os.environ.get("PMI_RANK", "0")))
 SIZE = int(os.environ.get("OMPI_COMM_WORLD_SIZE", os.environ.get("PMI_SIZE", "1")))
 LEFT_OUT = ("serial", "slow", "two_ranks") if SIZE > 2 else ("serial",) if SIZE > 1 else ()
@@ -281,7 +282,8 @@ def _load_forms_once() -> None:
 
     jit.get_cached_module = once  # type: ignore[attr-defined]
     known_file = SimpleNamespace(**vars(importlib.machinery) | {"FileFinder": _known_file})
-    jit.importlib = SimpleNamespace(**vars(importlib) | {"machinery": known_file})  # type: ignore[attr-defined]
+    known_importlib = SimpleNamespace(**vars(importlib) | {"machinery": known_file})
+    jit.importlib = known_importlib  # type: ignore[attr-defined]
     _do_not_print_options(sys.modules["ffcx"])
 
 
@@ -411,6 +413,27 @@ def shared_tmp(comm: Any) -> Iterator[Path]:
     yield Path(path)
     if comm.rank == 0:
         shutil.rmtree(path, ignore_errors=True)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _leaves_no_files() -> Iterator[None]:
+    """Fail where the tests of a file leave something in the clone or in the working directory.
+
+    Where the clone belongs to somebody else they could not even write it."""
+    folders = {CLONE, Path.cwd(), CLONE / "results"}
+    before = _list_entries(folders)
+    yield
+    left = sorted(_list_entries(folders) - before)
+    assert RANK or not left, (
+        f"tests of this file, or of one that ran beside it, left {', '.join(left)}: "
+        "let them write into tmp_path or shared_tmp, and give every run its out"
+    )
+
+
+def _list_entries(folders: Iterable[Path]) -> set[str]:
+    """Paths in these folders, but for those of tools, such as caches."""
+    entries = (entry for folder in folders if folder.is_dir() for entry in folder.iterdir())
+    return {str(entry) for entry in entries if not entry.name.startswith((".", "__pycache__"))}
 
 
 @pytest.fixture(autouse=True)

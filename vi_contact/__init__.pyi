@@ -63,6 +63,7 @@ from .run import ErrorControlled as ErrorControlled
 from .run import HalvedAtImpact as HalvedAtImpact
 from .run import JointEnergy as JointEnergy
 from .run import LargestStrain as LargestStrain
+from .run import LimitLoad as LimitLoad
 from .run import Probe as Probe
 from .run import Racking as Racking
 from .run import Reactions as Reactions
@@ -77,6 +78,7 @@ from .run import StressStrain as StressStrain
 from .run import contact_values as contact_values
 from .run import cross_check as cross_check
 from .run import joint_uniqueness as joint_uniqueness
+from .run import limit_load as limit_load
 from .run import march as march
 from .run import march_many as march_many
 from .run import quasi_static as quasi_static
@@ -86,6 +88,7 @@ from .run import rigid_limit_load as rigid_limit_load
 from .run import simulate as simulate
 from .run import simulate_many as simulate_many
 from .run import static_equilibrium as static_equilibrium
+from .run import tilt as tilt
 from .schemes import *  # noqa: F403
 from .solvers import Automatic as Automatic
 from .solvers import Condensed as Condensed

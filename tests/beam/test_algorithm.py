@@ -238,7 +238,10 @@ BAD: dict[str, tuple[Callable[[], object], str]] = {
         "viscosity is -1.0; give zero or a positive",
     ),
     "rod": (lambda: Rod(gap=-0.1), "gap is -0.1; give zero"),
-    "rod load": (lambda: Rod(end_force=3.0), "end_force is 3.0; give a function"),  # type: ignore[arg-type]
+    "rod load": (
+        lambda: Rod(end_force=3.0),  # type: ignore[arg-type]
+        "end_force is 3.0; give a function",
+    ),
     "elements": (lambda: Elements(1), "count is 1; give a whole number"),
     "published": (lambda: Elements(10, published_end=True), "reduced_shear=False"),
     "eps": (lambda: RegularisedFriction(0.0), "eps is 0.0; give a finite number above zero"),

@@ -138,7 +138,10 @@ def test_own_isotropic_forms_are_those_of_the_material(comm: Any, name: str, sec
 def test_mass_of_a_material_and_damping_of_ones_own(comm: Any) -> None:
     mesh, given, _, theirs, data = both(comm, "quadrilaterals", "strain")
     same(comm, fem.assemble(mesh, CONCRETE, forms=replace(given, mass=None), **data), theirs)
-    own = replace(given, damping=lambda u, v: 0.3 * given.mass(u, v) + 1e-3 * given.stiffness(u, v))  # type: ignore[misc]
+    own = replace(
+        given,
+        damping=lambda u, v: 0.3 * given.mass(u, v) + 1e-3 * given.stiffness(u, v),  # type: ignore
+    )
     same(comm, fem.assemble(mesh, forms=own, **{**data, "damping": None}), theirs)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -36,12 +37,19 @@ def block(joint: Any, lift: float, **more: Any) -> vc.ContactProblem:
     return vc.ContactProblem(system, surface, joint=joint)
 
 
+@cache
+def throw_until_it_yields() -> tuple[vc.ContactProblem, vc.State]:
+    """A thrown block, and its state after 60 steps of the midpoint rule."""
+    problem = throw(MPI.COMM_SELF, n=2)
+    *_, (state, _) = vc.march(problem, scheme=vc.Midpoint(), dt=step_of("J2", 2), steps=60)
+    return problem, state
+
+
 @pytest.mark.parametrize("scheme", [vc.Midpoint(), vc.Trapezoidal(), vc.Newmark(), vc.HHT()])
 def test_all_ways_to_march_keep_what_materials_remember(scheme: Any) -> None:
     """Schemes replace the memory of a state at their start; that of materials stays."""
-    problem = throw(MPI.COMM_SELF, n=2)
+    problem, before = throw_until_it_yields()
     dt = step_of("J2", 2)
-    *_, (before, _) = vc.march(problem, scheme=vc.Midpoint(), dt=dt, steps=60)
     *_, (state, _) = vc.march(problem, scheme=scheme, dt=dt, steps=5, state=before)
     solution = vc.simulate(problem, scheme=scheme, dt=dt, steps=5, state=before)
     assert np.array_equal(solution.state.u, state.u)
@@ -111,3 +119,10 @@ def test_the_energy_of_no_joint_is_not_recorded() -> None:
 def test_a_problem_says_which_law_its_joint_has() -> None:
     problem = block(laws.Joint(mu=0.6), lift=-1e4)
     assert "joint: Joint(mu=0.6" in repr(problem) and "Frictionless" not in repr(problem)
+
+
+@pytest.mark.parametrize("solver", [vc.Volume(), vc.Iterative()], ids=["volume", "iterative"])
+def test_solvers_without_contact_unknowns_refuse_slip_rates_before_any_work(solver: Any) -> None:
+    problem = block(laws.RateAndState(a=0.01, b=0.015, mu0=0.6, V0=1e-6, dc=1e-4), lift=0.0)
+    with pytest.raises(InputError, match=r"cannot use RateAndState.*use Condensed\(\)"):
+        vc.Stepper(problem, scheme=vc.Midpoint(), solver=solver)

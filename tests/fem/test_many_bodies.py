@@ -21,7 +21,7 @@ from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError, ViContactError
 from vi_contact.core.ledger import energy_balance
 from vi_contact.core.problem import ContactProblem
-from vi_contact.meshes import BlockMesh, Blocks
+from vi_contact.meshes import BlockMesh, Blocks, CutApart, GeoFile
 from vi_contact.run.damping import first_modes
 
 COMM = MPI.COMM_WORLD
@@ -218,6 +218,75 @@ def test_pyramid_of_three_stones():
 
 
 @pytest.mark.serial
+def test_pyramid_of_ten_stones_on_pads():
+    """Stones on two pads each, in the middle of the bed joints, smooth: the ground carries 1.5,
+    3.5, 3.5 and 1.5 weights, and the pads of the rows above .5, 1, 1.5, 1.5, 1, .5, then .5, 1, 1,
+    .5 and .5, .5."""
+    rows = (4, 3, 2, 1)
+    blocks = {
+        f"s{row}{i}": BlockMesh(
+            lengths=(1.0, 0.5), divisions=(4, 2), corner=(i + 0.5 * row, 0.5 * row)
+        )
+        for row, count in enumerate(rows)
+        for i in range(count)
+    }
+    mesh, tags = fem.build_mesh(Blocks(blocks), COMM)
+    load = fem.BodyForce((0.0, -2000.0 * GRAVITY))
+    system = fem.assemble(mesh, STONE, loads=load)
+    parts = [fem.contact_surface(system, tags[f"s0{i}_bottom"]) for i in range(4)]
+    for row in (1, 2, 3):
+        for i in range(rows[row]):
+            below = several(mesh, tags, *(f"s{row - 1}{j}_top" for j in (i, i + 1)))
+            pads = [(i + 0.5 * row + x, 0.5 * row) for x in (0.25, 0.75)]
+            parts.append(fem.contact_pair(system, tags[f"s{row}{i}_bottom"], below, points=pads))
+    problem = ContactProblem(system, fem.joined_surfaces(*parts))
+    state = vc.static_equilibrium(problem)
+    weights = state.r_n / (2000.0 * GRAVITY * 0.5)
+    ground = weights[:20].reshape(4, 5).sum(axis=1)
+    assert ground == pytest.approx([1.5, 3.5, 3.5, 1.5], rel=1e-8)
+    by_hand = [0.5, 1.0, 1.5, 1.5, 1.0, 0.5, 0.5, 1.0, 1.0, 0.5, 0.5, 0.5]
+    assert weights[20:] == pytest.approx(by_hand, rel=1e-8)
+
+
+@pytest.mark.serial
+def test_a_block_cut_from_its_ground_is_lifted_off(tmp_path):
+    """Case 02: both are drawn between the same corner points. Cut apart the block of 47 kN is
+    lifted by 80 kN and has no equilibrium; under 40 kN it stands, and nothing hangs on corners."""
+    pytest.importorskip("gmsh")
+    path = tmp_path / "rim.geo"
+    path.write_text(RIM)
+    mesh, tags = fem.build_mesh(CutApart(source=GeoFile(path=str(path))), COMM)
+    materials = [(tags["block"], STONE), (tags["soil"], STONE)]
+    for lift in (20e3, 40e3):
+        load = fem.Traction(tags["top"], (0.0, lift))
+        system = fem.assemble(mesh, materials, clamped=tags["rock"], loads=load)
+        system = vc.with_weight(system, acceleration=GRAVITY)
+        problem = ContactProblem(system, fem.contact_pairs(system, tags=tags))
+        if 2.0 * lift < 2.0 * 2000.0 * GRAVITY:
+            state = vc.static_equilibrium(problem)
+            assert state.r_n.sum() == pytest.approx(2.0 * (2000.0 * GRAVITY - lift), rel=1e-8)
+        else:
+            with pytest.raises(ViContactError, match="no static equilibrium"):
+                vc.static_equilibrium(problem)
+
+
+# block on soil; both surfaces use the corner points 1 and 2, each has a line of its own between
+RIM = """
+h = 0.5;
+Point(1) = {0,0,0,h}; Point(2) = {2,0,0,h}; Point(3) = {2,1,0,h}; Point(4) = {0,1,0,h};
+Line(1) = {1,2}; Line(2) = {2,3}; Line(3) = {3,4}; Line(4) = {4,1};
+Curve Loop(1) = {1:4}; Plane Surface(1) = {1};
+Point(12) = {-3,0,0,h}; Point(13) = {-3,-3,0,1}; Point(14) = {5,-3,0,1}; Point(15) = {5,0,0,h};
+Line(11) = {1,12}; Line(12) = {12,13}; Line(13) = {13,14}; Line(14) = {14,15};
+Line(15) = {15,2}; Line(16) = {2,1};
+Curve Loop(2) = {11:16}; Plane Surface(2) = {2};
+Transfinite Curve {1,16} = 5;
+Physical Surface("block") = {1}; Physical Surface("soil") = {2};
+Physical Curve("rock") = {13}; Physical Curve("top") = {3};
+"""
+
+
+@pytest.mark.serial
 @pytest.mark.parametrize(("mu", "limit"), [(0.7, 0.5), (0.3, 0.3)], ids=["topples", "slides"])
 def test_a_stack_that_tilts(mu, limit):
     """Four stones of 1 × 0.5 m: they slide at tan θ = mu, and topple at b/h = 1/2, whichever comes
@@ -340,6 +409,46 @@ def test_lifted_in_the_corner_of_two_walls(mu, push, walls, lift, turn):
         else:
             assert state.r_n == pytest.approx(walls, rel=1e-9)
             assert v[2] == pytest.approx((force[2] - (lift - 200.0)) / 20.0 * 5e-3, rel=1e-7)
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("mu", [0.3, 0.5])
+def test_a_cube_that_slides_up_in_the_corner_of_two_walls(mu):
+    """The same of a cube that deforms, pressed first without friction: it rises as its forces by
+    hand say, with 707.107 N on each wall and mu of that against it, and every step's energy is
+    accounted for."""
+    side, dt = 0.2, 1e-3
+    mesh, tags = fem.build_mesh(BlockMesh(lengths=(side,) * 3, divisions=(2, 2, 2)), COMM)
+    push = 1000.0 * cos(pi / 4.0)
+    cube = vc.LinearElastic(E=1e8, nu=0.0, rho=20.0 / side**3)
+    rise = 2.0 * mu * push + 100.0  # 100 N more than friction bears, weight taken off
+    problems = []
+    for lift in (0.0, rise):
+        force = np.array([-push, -push, lift]) / side**3
+        system = fem.assemble(mesh, cube, loads=fem.BodyForce(tuple(force)))
+        parts = [fem.contact_surface(system, tags[name]) for name in ("left", "bottom")]
+        first = len(parts[0].gap0)
+        surface = fem.joined_surfaces(*parts).with_own_laws()
+        problems.append(ContactProblem(system, surface, friction=vc.Coulomb(mu)))
+    smooth = ContactProblem(problems[0].system, problems[0].surface)
+    rest = vc.static_equilibrium(smooth)
+    worst, size = 0.0, 0.0
+    walls, drag = [], []
+    problem = problems[1]
+    for state, report in vc.march(problem, state=rest, dt=dt, steps=30, scheme=vc.MoreauJean()):
+        energy = energy_balance(report.problem, report.old, report.new, report.balance)
+        worst = max(worst, abs(energy.defect))
+        size += abs(energy.input)
+        r_n, r_t = report.result.r_n, report.result.r_t
+        walls.append([r_n[:first].sum() / dt, r_n[first:].sum() / dt])
+        reaction = problem.surface.reaction_load(r_n, len(state.u), r_t)
+        drag.append(reaction.reshape(-1, 3)[:, 2].sum() / dt)
+    assert worst < 1e-9 * size
+    # both walls alike; over two swings of the cube, when it slides as a whole
+    last = np.mean(walls[-12:], axis=0)
+    assert last[0] == pytest.approx(last[1], rel=1e-9)
+    assert last[0] == pytest.approx(push, rel=4e-3)
+    assert np.mean(drag[-12:]) == pytest.approx(2.0 * mu * push, rel=4e-3)
 
 
 @pytest.mark.serial

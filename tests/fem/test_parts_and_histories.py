@@ -133,7 +133,7 @@ def test_histories_that_cannot_be_meant_are_refused(comm: Any) -> None:
     ):
         with pytest.raises(InputError, match=words):
             fem.Prescribed(tags["top"], **given)
-    moved = fem.Prescribed(tags["top"], (0.0, 1e-3), history=lambda t: "a")  # type: ignore[arg-type,return-value]
+    moved = fem.Prescribed(tags["top"], (0.0, 1e-3), history=lambda t: "a")  # type: ignore
     with pytest.raises(InputError, match="prescribed motion on 'top' at t = "):
         list(vc.quasi_static(linear(fem.assemble(mesh, CONCRETE, prescribed=moved)), [1.0]))
     same = [fem.Prescribed(tags["top"], (0.0, 1e-3), history=f) for _ in range(2)]

@@ -14,6 +14,7 @@ import pytest
 pytest.importorskip("dolfinx")
 
 import h5py
+from bar_case import BAR
 from fem_problems import CONCRETE, block, shaken_wall
 from test_fields import DT
 from test_fields import frames as xdmf_frames
@@ -28,22 +29,7 @@ from vi_contact.core.vtkhdf import list_steps, open_series
 from vi_contact.fem import compat
 from vi_contact.practice.plots.deformed import read_frames
 
-WALL = """
-[mesh]
-type = "WallMesh"
-width = 2.0
-height = 1.0
-divisions = [4, 2]
-[material.rubber]
-E = 1e6
-nu = 0.3
-rho = 1000.0
-[system]
-fixed = "base"
-[[contact]]
-facets = "face"
-obstacle = {type = "HalfSpace", point = [2.001, 0.0], normal = [-1.0, 0.0]}
-[scheme]
+WALL = f"""{BAR}[scheme]
 type = "ZienkiewiczWoodTaylor"
 [run]
 dt = 0.01

@@ -10,6 +10,7 @@ from demo_runs import demo
 from pictures import is_drawn
 
 
+@pytest.mark.serial
 def test_the_column_falls_over(comm: Any, shared_tmp: Path) -> None:
     """Beside the rigid block until that lies."""
     numbers = demo("column").main(quick=True, out=shared_tmp, progress=False)

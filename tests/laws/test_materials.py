@@ -164,4 +164,4 @@ def test_numbers_of_no_material_are_refused():
 
 def test_functions_of_the_place_are_another_material() -> None:
     with pytest.raises(InputError, match=r"numbers; give fem\.Heterogeneous\(E, nu, rho, xi\)"):
-        LinearElastic(E=lambda x: 2.0e10 * (1.0 + x[0]), nu=0.3, rho=2400.0)  # type: ignore[arg-type]
+        LinearElastic(E=lambda x: 2.0e10 * (1.0 + x[0]), nu=0.3, rho=2400.0)  # type: ignore

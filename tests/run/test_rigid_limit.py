@@ -121,6 +121,7 @@ def round_arch(n: int, t: float) -> RigidBlocks:
 
 
 @pytest.mark.slow
+@pytest.mark.serial
 @pytest.mark.parametrize(
     ("make", "known"),
     [

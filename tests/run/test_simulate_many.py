@@ -15,6 +15,7 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from demos.parts.problems.wall import Wall, build
+from vi_contact.core.packages import petsc_has
 
 MODEL = build(Wall(divisions=(4, 6)), MPI.COMM_WORLD)
 DT = MODEL.time_step()
@@ -86,9 +87,9 @@ def test_a_run_that_cannot_begin_or_go_on_leaves_the_others(shared_tmp):
         vc.simulate(BASE, dt=DT, steps=1, progress=False).state, u=np.full(3, np.nan)
     )
     ends = list(vc.simulate_many(asked))
-    assert [number for number, _ in ends] == (
-        [3, 1, 0, 2] if MPI.COMM_WORLD.size == 1 else [3, 0, 1, 2]
-    )
+    # what shares no factor of CHOLMOD, which is of one rank, goes one run after the other
+    together = MPI.COMM_WORLD.size == 1 and petsc_has("cholmod")
+    assert [number for number, _ in ends] == ([3, 1, 0, 2] if together else [3, 0, 1, 2])
     found = dict(ends)
     assert isinstance(found[3], vc.InputError) and str(found[1]) == "enough"
     assert alike(found[2].history, vc.simulate(SHAKEN[2], dt=DT, steps=40, progress=False).history)

@@ -198,7 +198,10 @@ def test_nonsense_plans_are_refused(make, word):
 def test_plans_say_the_same_whatever_numbers_they_are_given():
     """repr is what a checkpoint compares."""
     plain = HalvedAtImpact(Schedule(((1e-3, 1.0), (1.0, inf))), 2)
-    other = HalvedAtImpact(Schedule([[np.float64(1e-3), 1], (1, np.inf)]), np.int64(2))  # type: ignore[arg-type]
+    other = HalvedAtImpact(
+        Schedule([[np.float64(1e-3), 1], (1, np.inf)]),  # type: ignore[arg-type]
+        np.int64(2),
+    )
     assert plain == other and repr(plain) == repr(other)
     assert (
         repr(plain) == "HalvedAtImpact(dt=Schedule(pieces=((0.001, 1.0), (1.0, inf))), halvings=2)"

@@ -128,7 +128,10 @@ def test_V94_contact_work_without_mass() -> None:
     """V9.4: ½ (r1 g0 - r0 g1) is all that contact takes or gives; five periods of V1.2 at Courant
     number one end with 0.992 of the energy (table 1.7)."""
     problem = bouncing(100, mass=Redistributed())
-    gap = lambda state: float((problem.surface.gap0 - problem.surface.normal_values(state.u))[0])  # noqa: E731
+
+    def gap(state: Any) -> float:
+        return float((problem.surface.gap0 - problem.surface.normal_values(state.u))[0])
+
     total, first = 0.0, energy(problem, Newmark().start(problem, initial_state(problem), 1 / 300))
     for report in run(problem, Newmark(), dt=1 / 300, steps=8000):
         total += 0.5 * (report.new.r_n[0] * gap(report.old) - report.old.r_n[0] * gap(report.new))

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bar_case import BAR
 from written_runs import write_run
 
 pytest.importorskip("dolfinx")
@@ -21,23 +22,7 @@ from vi_contact.practice.studies.report import report
 from vi_contact.run.files.reading import read_run
 
 pytestmark = pytest.mark.serial
-CASE = """
-title = "A bar that rings"
-[mesh]
-type = "WallMesh"
-width = 2.0
-height = 1.0
-divisions = [4, 2]
-[material.rubber]
-E = 1e6
-nu = 0.3
-rho = 1000.0
-[system]
-clamped = "base"
-[[contact]]
-facets = "face"
-obstacle = {type = "HalfSpace", point = [2.001, 0.0], normal = [-1.0, 0.0]}
-[[excitation]]
+CASE = f"""title = "A bar that rings"{BAR}[[excitation]]
 type = "Harmonic"
 amplitude = 20.0
 frequency = 3.0
@@ -51,7 +36,7 @@ t_end = 0.2
 type = "Contact"
 [[record]]
 type = "Probe"
-points = {end = [2.0, 1.0]}
+points = {{end = [2.0, 1.0]}}
 """
 SHEET = '[sheet]\nproject = "P"\nnumbers = ["contact_resultant", "u_x_end"]\n'
 

@@ -14,6 +14,7 @@ pytest.importorskip("dolfinx")
 from contact_cases import PROBLEMS, WEAKENING, pressed
 from fem_problems import BOX_DT, max_over_ranks, thrown_box
 from mpi4py import MPI
+from petsc_packages import needs
 from posed import matrix_of
 
 import vi_contact as vc
@@ -97,6 +98,7 @@ def test_statics_agree(d: int, law: Any) -> None:
         )
 
 
+@needs("cholmod")
 def test_halved_steps_agree_and_each_dt_has_its_factor() -> None:
     problem = replace(thrown_box(COMM), friction=vc.Coulomb(0.3))
     dt = vc.HalvedAtImpact(BOX_DT, halvings=2)
@@ -124,6 +126,7 @@ def test_impulses_agree() -> None:
     assert max_over_ranks(COMM, found - v) > 1e-3
 
 
+@needs("cholmod")
 def test_what_else_factorises(monkeypatch: Any) -> None:
     """What CHOLMOD cannot do, what users order otherwise, and machines without it: PETSc
     factorises."""

@@ -127,10 +127,12 @@ def test_the_pressure_at_rest(
     # The picture has the run and the two formulas that apply, in kPa, on axes with names.
     (axis,) = figures[0].axes
     lines = {line.get_label(): line for line in axis.lines}
-    assert {"at rest", "Mononobe–Okabe, kh = 0.2", "run, t = 0 s"} <= set(lines)
+    assert {"at rest", "Mononobe–Okabe, kh = 0.2"} <= set(lines)
+    # at rest round-off chooses the step of the largest thrust, which a label tells too
+    first = next(label for label in lines if label.startswith("run, t = 0 s"))
     assert "Coulomb" not in lines
     assert lines["at rest"].get_xdata()[0] == pytest.approx(20.0, rel=1e-9)
-    assert lines["run, t = 0 s"].get_xdata()[1] == pytest.approx(20.0 * 2.5 / 3.0, rel=1e-7)
+    assert lines[first].get_xdata()[1] == pytest.approx(20.0 * 2.5 / 3.0, rel=1e-7)
     assert axis.get_xlabel() == "normal pressure [kPa]"
     assert axis.get_ylabel() == "height above the foot [m]"
     assert lines["at rest"].get_linestyle() != lines["Mononobe–Okabe, kh = 0.2"].get_linestyle()

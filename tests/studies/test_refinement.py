@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bar_case import BAR
 from mpi4py import MPI
 
 from vi_contact.core.errors import InputError
@@ -17,26 +18,10 @@ from vi_contact.run.files.reading import read_run
 
 pytestmark = pytest.mark.serial
 pytest.importorskip("dolfinx")
-CASE = """
-title = "A bar that rings"
-[mesh]
-type = "WallMesh"
-width = 2.0
-height = 1.0
-divisions = [4, 2]
-[material.rubber]
-E = 1e6
-nu = 0.3
-rho = 1000.0
-[system]
-fixed = "base"
-[[contact]]
-facets = "face"
-obstacle = {type = "HalfSpace", point = [2.001, 0.0], normal = [-1.0, 0.0]}
-[[excitation]]
+CASE = f"""title = "A bar that rings"{BAR}[[excitation]]
 type = "GroundMotion"
 direction = [1.0, 0.0]
-record = {path = "motion.txt", units = "m/s2"}
+record = {{path = "motion.txt", units = "m/s2"}}
 [scheme]
 type = "ZienkiewiczWoodTaylor"
 [run]
@@ -48,7 +33,7 @@ type = "Energy"
 type = "Contact"
 [[record]]
 type = "Probe"
-points = {end = [2.0, 1.0]}
+points = {{end = [2.0, 1.0]}}
 acceleration = true
 [fields]
 every = 10

@@ -159,7 +159,7 @@ class Lubkin:
     def over(self, function: Callable[[Array], Array], c: float) -> Array:
         """∫_0^a φ(t) function(t) dt; the last axis of what the function returns is t's."""
         parts = [gauss(0.0, c), gauss(c, self.a)]
-        return sum(function(t) @ (w * self.density(t, c)) for t, w in parts)  # type: ignore[return-value]
+        return sum(function(t) @ (w * self.density(t, c)) for t, w in parts)  # type: ignore
 
     def moment(self, c: float) -> float:
         """T [N m]."""

@@ -244,7 +244,7 @@ BARS = {
 def followed(case: Any, name: str, t_end: float) -> tuple[Array, Array, Array, Array, float]:
     """(times, forces, energies, means of the forces in a step, dt) of the default scheme, a quarter
     of a cell a step."""
-    model = build(Bar(case, elements=50, across=2, degree=2, **BARS[name]), COMM)  # type: ignore[arg-type]
+    model = build(Bar(case, elements=50, across=2, degree=2, **BARS[name]), COMM)  # type: ignore
     bar, dt, rows = model.bar, model.bar.time_step(0.25), []
     for state, report in vc.march(model.problem(), dt=dt, steps=round(t_end / dt)):
         system, load = report.problem.equations, report.problem.equations.load

@@ -434,9 +434,15 @@ def test_nothing_stays_behind(comm: Any, kind: str) -> None:
         else:
             problem.solve(lower=-0.05 - 0.01 * x[0], upper=lambda x: 1.0 + x[0])
 
-    growths = [benchmark.measure_leak(call, 40) for _ in range(3)]
-    assert min(size for size, _ in growths) <= 250.0  # the whole field has 968 bytes
-    assert min(blocks for _, blocks in growths) <= 5.0  # of some thousand that a call makes
+    sizes, blocks = [], []
+    for _ in range(3):
+        size, count = benchmark.measure_leak(call, 40)
+        sizes.append(size)
+        blocks.append(count)
+        if min(sizes) <= 250.0 and min(blocks) <= 5.0:
+            break
+    assert min(sizes) <= 250.0  # the whole field has 968 bytes
+    assert min(blocks) <= 5.0  # of some thousand that a call makes
 
 
 @pytest.mark.serial

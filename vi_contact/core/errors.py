@@ -38,6 +38,10 @@ class InputError(ViContactError, ValueError):
     """
 
 
+class NoEquilibrium(InputError):
+    """Say that loads drive a rigid motion that nothing stops: there is no static equilibrium."""
+
+
 class StepFailure(ViContactError, RuntimeError):
     """Say that a step passed no certificate with any method; nothing before it is lost."""
 

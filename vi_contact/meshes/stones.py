@@ -6,6 +6,7 @@ they are found from the geometry (``fem.find_joints``).
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -22,12 +23,12 @@ from vi_contact.meshes.grid import Grid, add_grids
 BED_SIDES = [(f"ground_{low}", f"ground_{high}") for low, high in SIDES]
 
 
-class OfGrids:
+class OfGrids(ABC):
     """Put the grids of a mesh into Gmsh's model."""
 
+    @abstractmethod
     def grids(self) -> list[Grid]:
         """Return the grids of all bodies."""
-        raise NotImplementedError
 
     def build(self, gmsh: Any) -> None:
         """Add all bodies to Gmsh's current model."""

@@ -5,6 +5,9 @@ from .cross_check import cross_check as cross_check
 from .files.reading import RunFolder as RunFolder
 from .files.reading import read_run as read_run
 from .joint_uniqueness import joint_uniqueness as joint_uniqueness
+from .limit_load import LimitLoad as LimitLoad
+from .limit_load import limit_load as limit_load
+from .limit_load import tilt as tilt
 from .march import march as march
 from .march_many import march_many as march_many
 from .method import with_defaults as with_defaults

@@ -26,10 +26,12 @@ import numpy as np
 
 from ..core.algebra import Array, EffectiveMatrix, Mask, largest, max_abs
 from ..core.certificate import Certificate
-from ..core.errors import InputError, StepFailure
+from ..core.checks import describe_point
+from ..core.errors import NoEquilibrium, StepFailure
 from ..core.problem import ContactProblem
 from ..core.step import Solver, StepProblem, StepResult
 from ..core.verify import kkt_residual
+from ..laws.free_motions import count_bodies
 from ..solvers.correction import MARGIN, add, choose_share, keep_reactions, pose_remainder
 from ..solvers.passes import Certified, Passes, certify
 from .rigid_bodies import RigidBodies, make_body_springs
@@ -44,6 +46,8 @@ NEAR = 1e-3  # of the tolerance: what stiff bodies reach on soft ones
 UNBRAKED = 0.99999  # of the step before: a motion that only a new contact can stop
 # of the largest motion: what a contact point may move towards its obstacle in a free motion
 STOPPED = 1e-9
+MOVES = 1e-3  # of the largest displacement: a body that moves more is counted
+MOST = 0.999  # the same: bodies that move most, but for rounding
 
 
 @dataclass(frozen=True)
@@ -103,9 +107,15 @@ class _Progress(Passes[_Pass]):
 
 
 class Proximal:
-    """Iterate by the proximal-point method for the matrix ``K``, which is singular."""
+    """Iterate by the proximal-point method for the matrix ``K``, which is singular.
+
+    Attributes:
+        step: the stage.
+        motion: the last increment d (n,) [m]; where there is no equilibrium, what the loads drive.
+    """
 
     step: StepProblem
+    motion: Array
 
     def __init__(
         self, problem: ContactProblem, K: EffectiveMatrix, solver: Solver, tolerance: float
@@ -119,6 +129,7 @@ class Proximal:
             tolerance: of the certificate, relative.
         """
         solver.check(problem)
+        self._problem = problem
         self._system = problem.static_load
         self._surface = problem.surface
         self._K = K
@@ -195,6 +206,7 @@ class Proximal:
             increment = self._prepared.solve(inner)
             result = add(self.step, answer, increment, share)
             new = self._measure_motion(result.x - centre, increment.active)
+            self.motion = new.d
             there = _Pass(result, self.certificate(result), False, new)
             worst = there.worst
             yield there
@@ -273,7 +285,7 @@ class Proximal:
         return np.asarray((motion.closing > STOPPED * size) & np.isfinite(self.step.bound))
 
     def _refuse_flight(self, motion: _Motion, u: Array) -> None:
-        """Raise InputError for a rigid motion without end that loads drive. Collective.
+        """Raise NoEquilibrium for a rigid motion without end that loads drive. Collective.
 
         It bends nothing, dᵀKd = 0, the loads work on it, f·d > 0, and no contact stops it. Where
         there is an equilibrium u*, f·d is at most u*ᵀK d for such a motion, so that a work below
@@ -294,10 +306,10 @@ class Proximal:
         if work**2 < 2.0 * system.strain_energy(u) * bending:
             return
         way = self._describe_way(motion.d)
-        raise InputError(
+        raise NoEquilibrium(
             f"the body has no static equilibrium: its loads {way} and neither contact nor a "
-            "prescribed displacement stops it: hold it there, change the loads, or start the "
-            "dynamics from rest"
+            f"prescribed displacement stops it{self._describe_bodies(motion.d)}: hold it there, "
+            "change the loads, or start the dynamics from rest"
         )
 
     def _describe_way(self, d: Array) -> str:
@@ -310,6 +322,31 @@ class Proximal:
             return "turn it on the spot"
         way = ", ".join(f"{x / largest if abs(x) > 1e-4 * largest else 0.0:.2g}" for x in push)
         return f"carry it off along ({way})"
+
+    def _describe_bodies(self, d: Array) -> str:
+        """Return in words which of several bodies a motion d (n,) moves, "" for one. Collective."""
+        problem = self._problem
+        comm = problem.surface.comm
+        space = problem.system.space
+        numbers = np.asarray(space.bodies)
+        count = count_bodies(comm, numbers)
+        if count == 1:
+            return ""
+
+        # The largest displacement of each body, and the first of those that move most.
+        size = np.zeros(count)
+        np.maximum.at(size, numbers, np.abs(problem.cartesian(d)))
+        size = comm.max(size)
+        moving = np.count_nonzero(size > MOVES * size.max())
+        first = int(np.flatnonzero(size > MOST * size.max())[0])
+
+        # The mean of its nodes is where it is.
+        own = space.coordinates[numbers == first]
+        *place, nodes = comm.sum(np.append(own.sum(axis=0), len(own)))
+        extent = comm.max(np.abs(space.coordinates).max(axis=0, initial=0.0)).max()
+        place = [x / nodes if abs(x / nodes) > 1e-9 * extent else 0.0 for x in place]
+        where = describe_point(np.array(place))
+        return f" ({moving} of {count} bodies move, such as that at {where})"
 
     def _look_ahead(self, old: _Motion, new: _Motion, result: StepResult) -> float:
         """Return how many times d to go further at once.

@@ -7,8 +7,8 @@
 
 In x = u1:  A = 4/dt² M + 2/dt C + K,  b = 4/dt² M u_p + 2/dt C u0 - K u0 + 2 f,  scale = 2,
 guess u_p. The impulse that projects the predictor moves contact nodes to the obstacle and leaves
-their velocity alone: r̄ is what the body presses with, not what stops the mass of the contact nodes.
-They keep the velocity of their approach till they open.
+their velocity alone: r̄ is what the body presses with, not what stops the mass of the contact
+nodes. They keep the velocity of their approach till they open.
 
 Order 2 without contact (the midpoint rule); unconditionally stable. Energy, q [N s²] the
 projection's multipliers:

@@ -12,8 +12,8 @@ stored energy, and it has no moment about the middle places. So in free flight
 to round-off. Of a linear body p̄ = ½ K (u0 + u1), and the scheme is the midpoint rule. In x = u1:
 A = 4/dt² M + 2/dt C + K,  scale = 2; passes of a step have a tangent in the place of K.
 
-Order 2, unconditionally stable, no damping of any frequency. A closure loses r̄_n times the gap that
-was closed: contact never creates energy. Contact nodes have their mass, so their forces ring.
+Order 2, unconditionally stable, no damping of any frequency. A closure loses r̄_n times the gap
+that was closed: contact never creates energy. Contact nodes have their mass, so their forces ring.
 Source: Simo and Tarnow, Z. angew. Math. Phys. 43 (1992) 757-792.
 """
 

@@ -460,8 +460,8 @@ def _matches(row: Row, chosen: Mapping[str, Any]) -> bool:
             raise InputError(f"data.csv has no column '{column}', by which rows are chosen")
         value = row[column]
         if isinstance(wish, Mapping):
-            inside = isinstance(value, float)
-            inside = inside and wish.get("least", -math.inf) <= value <= wish.get("most", math.inf)  # type: ignore[operator]
+            least, most = wish.get("least", -math.inf), wish.get("most", math.inf)
+            inside = isinstance(value, float) and least <= value <= most
         else:
             inside = value in (wish if isinstance(wish, list) else [wish])
         if not inside:

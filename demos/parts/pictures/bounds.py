@@ -25,7 +25,10 @@ def gathered(function: Any) -> tuple[Any, Any] | None:
     parts = space.mesh.comm.gather(
         (space.tabulate_dof_coordinates()[:n], np.array(function.x.array[:n])), root=0
     )
-    return None if parts is None else tuple(np.concatenate(one) for one in zip(*parts, strict=True))  # type: ignore
+    if parts is None:
+        return None
+    points, values = zip(*parts, strict=True)
+    return np.concatenate(points), np.concatenate(values)
 
 
 def plot_membrane(

@@ -53,7 +53,9 @@ class InitialStrain(ActingLoad):
     """
 
     # the value as it is given
-    value: Annotated[float | Sequence[Sequence[float]] | Callable[[Array, float], Array], RATIO]  # type: ignore[assignment]
+    value: Annotated[  # type: ignore[assignment]
+        float | Sequence[Sequence[float]] | Callable[[Array, float], Array], RATIO
+    ]
     history: Callable[[float], float] | None = None
     cells: Cells | None = None
 

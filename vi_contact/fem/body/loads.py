@@ -379,7 +379,10 @@ class Pressure(Traction):
         history: as of ``Traction``.
     """
 
-    value: Annotated[float | Callable[[Array, float], Array], Unit("Pa")]  # type: ignore[assignment]  # what is given
+    # what is given
+    value: Annotated[  # type: ignore[assignment]
+        float | Callable[[Array, float], Array], Unit("Pa")
+    ]
 
     def __post_init__(self) -> None:
         given: Any = self.value

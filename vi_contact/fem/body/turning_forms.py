@@ -11,9 +11,9 @@ Because C1 - C0 = 2 sym(½ (F0 + F1)ᵀ (F1 - F0)), its work is that of the stor
     (u1 - u0)·p̄ = ∫ ½ S̄ : (C1 - C0) = W(u1) - W(u0)
 
 and because S̄ is symmetric, forces of the middle place have no moment: energy, momentum and spin
-are kept by any length of step. For Saint-Venant and Kirchhoff's law S̄ is the mean of both stresses.
-Other energies take Gauss's rule in s: an average of dW/dC has no 0/0 where little strains, as the
-quotient of Gonzalez (1996) has, which loses all digits in stiff bodies.
+are kept by any length of step. For Saint-Venant and Kirchhoff's law S̄ is the mean of both
+stresses. Other energies take Gauss's rule in s: an average of dW/dC has no 0/0 where little
+strains, as the quotient of Gonzalez (1996) has, which loses all digits in stiff bodies.
 
 Sources: Simo and Tarnow, Z. angew. Math. Phys. 43 (1992) 757-792; Gonzalez, Comput. Methods Appl.
 Mech. Eng. 190 (2000) 1763-1783; the average along s: McLachlan, Quispel and Robidoux, Phil. Trans.

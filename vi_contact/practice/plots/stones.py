@@ -8,17 +8,16 @@ import numpy as np
 from ...core.algebra import Array, Indices
 from ...core.checks import number, provides
 from ...core.errors import InputError
+from ...run.limit_load import LimitLoad
 from ...run.rigid_limit import RigidLimit
+from .axes_in_plane import FIXED, LONGEST, STONES, make_axis
 from .histories import canvas, save
+from .moved_cells import draw_moved_cells
 
-# Colours of bodies, light so that numbers can be read; neighbours by number differ.
-STONES = ("#e8dcc8", "#d9c7a8", "#efe6d6", "#cfbf9f", "#e2d3b8")
-FIXED = "#b8b8b8"  # what does not move
 JOINT = "#c8401e"
 OPENS = "#c8401e"
 SLIDES = "#2b6cb0"
 CORNER = "#6a3d9a"
-LONGEST = 7.0  # of the longer side of a picture [inches]
 MOST_NUMBERS = 250  # joints that get a number; more could not be read
 SIZE = 0.12  # of a mechanism: fastest displacement over the size of the whole, by default
 
@@ -50,15 +49,20 @@ def plot_joints(joints: Any, path: str | Path, *, title: str | None = None) -> P
 
 
 def plot_mechanism(
-    limit: RigidLimit, path: str | Path, *, size: float = SIZE, title: str | None = None
+    limit: RigidLimit | LimitLoad,
+    path: str | Path,
+    *,
+    size: float = SIZE,
+    title: str | None = None,
 ) -> Path:
-    """Draw rigid blocks at their limit load, moved as the mechanism moves them.
+    """Draw bodies at their limit load, moved as the mechanism moves them.
 
-    Where they stand is drawn in grey. The sides of joints that open are red, of those that only
-    slide blue.
+    Where they stand is drawn in grey. Of rigid blocks the sides of joints that open are red, of
+    those that only slide blue; of a mesh the cells are drawn.
 
     Args:
-        limit: of ``rigid_limit_load``, whose blocks are those of a mesh.
+        limit: of ``rigid_limit_load``, whose blocks are those of a mesh; or of ``limit_load`` or
+            ``tilt`` in the plane, on one rank.
         path: the picture; its ending says the format.
         size: largest displacement, over the size of the whole.
         title: stands above the picture; None for the multiplier.
@@ -67,9 +71,13 @@ def plot_mechanism(
         the path.
 
     Raises:
-        InputError: blocks without outlines, no mechanism, a format that matplotlib does not write.
+        InputError: blocks without outlines, no mechanism, bodies without a mesh in the plane, a
+            format that matplotlib does not write.
     """
     number("plot_mechanism", "size", size, positive=True)
+    if isinstance(limit, LimitLoad):
+        heading = title or f"mechanism above {limit.multiplier:.4g} times the load"
+        return save(draw_moved_cells(limit, size), path, heading)
     blocks = limit.blocks
     if blocks.outlines is None or blocks.outline_bodies is None:
         raise InputError(
@@ -80,7 +88,7 @@ def plot_mechanism(
         raise InputError("plot_mechanism: the multiplier has no limit, and there is no mechanism")
     whole = float(np.ptp(blocks.outlines.reshape(-1, 2), axis=0).max())
     moved = _move(limit, blocks.outlines, blocks.outline_bodies, size * whole)
-    figure, axis = _make_axis(np.concatenate([blocks.outlines, moved]))
+    figure, axis = make_axis(np.concatenate([blocks.outlines, moved]).reshape(-1, 2))
     _draw_bodies(axis, blocks.outlines, blocks.outline_bodies, faint=True)
     _draw_bodies(axis, moved, blocks.outline_bodies)
     for colour, label, some in _sort_joints(limit):
@@ -132,7 +140,7 @@ def _move(limit: RigidLimit, points: Array, bodies: Indices, size: float) -> Arr
 
 def _draw_in_plane(joints: Any) -> Any:
     """Return a figure of bodies and joints in the plane."""
-    figure, axis = _make_axis(joints.outlines)
+    figure, axis = make_axis(joints.outlines.reshape(-1, 2))
     _draw_bodies(axis, joints.outlines, joints.outline_bodies)
     for joint in joints:
         axis.plot(*joint.ends.T, color=JOINT, lw=1.8, zorder=3)
@@ -182,18 +190,6 @@ def _draw_in_space(joints: Any) -> Any:
     axis.locator_params(nbins=5)
     axis.set_box_aspect(high - low, zoom=0.85)  # room for the words of the axes
     return figure
-
-
-def _make_axis(outlines: Array) -> tuple[Any, Any]:
-    """Return a figure and its axis, of the shape that outlines (k, 2, 2) have."""
-    points = outlines.reshape(-1, 2)
-    extent = np.ptp(points, axis=0)
-    shape = np.maximum(LONGEST * extent / extent.max(), 0.3 * LONGEST)
-    figure, axes = canvas(1, 1, (float(shape[0]) + 0.8, float(shape[1]) + 0.8), False)
-    axis = axes[0, 0]
-    axis.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
-    axis.margins(0.03)
-    return figure, axis
 
 
 def _draw_bodies(axis: Any, outlines: Array, bodies: Indices, *, faint: bool = False) -> None:

@@ -8,7 +8,8 @@ the points of a part, about its centre c:
 
     uplift = 1 - L_contact / L (by weight),    F = sum f,
     M = sum (X - c) x f   (anticlockwise positive)
-    N = -F·n̄ (compression positive),  T = F·t̄,  e = M / N,    height = sum r_n (X - c)·up / sum r_n
+    N = -F·n̄ (compression positive),  T = F·t̄,  e = M / N,
+    height = sum r_n (X - c)·up / sum r_n
 
 n̄ is the mean direction of the part by weight, t̄ = (-n̄_y, n̄_x), up the last axis. On level
 ground N is the vertical force, T points to the right, and N acts at the distance e to the right of

@@ -62,8 +62,8 @@ class BoundedSystem:
     @property
     def comm(self) -> Any:
         """Return the PETSc communicator."""
-        matrix = self.A.matrix
-        return PETSc.COMM_SELF if isinstance(matrix, SerialMatrix) else matrix.mat.comm  # type: ignore[attr-defined]
+        matrix: Any = self.A.matrix
+        return PETSc.COMM_SELF if isinstance(matrix, SerialMatrix) else matrix.mat.comm
 
     def max(self, *values: float) -> Array:
         """Return the maxima over the ranks."""
@@ -121,11 +121,11 @@ class BoundedSystem:
 
     def norm(self) -> float:
         """Return an upper bound of the largest absolute row sum of A."""
-        matrix = self.A.matrix
+        matrix: Any = self.A.matrix
         if isinstance(matrix, SerialMatrix):
             largest = float(abs(matrix.csr).sum(axis=1).max())
         else:
-            largest = float(matrix.mat.norm(PETSc.NormType.NORM_INFINITY))  # type: ignore[attr-defined]
+            largest = float(matrix.mat.norm(PETSc.NormType.NORM_INFINITY))
         return largest + 2.0 * float(self.max(np.max(self.spring, initial=0.0))[0])
 
     def assemble(self) -> Any:

@@ -38,12 +38,14 @@ _COUNT = re.compile(
     re.IGNORECASE,
 )
 _COUNT_FIRST = re.compile(
-    r"(?<![\d.])(\d++)\s++(?:data\s++)?(?:points|samples|values)\s++(?:at|of|equally|evenly|spaced|with)",
+    r"(?<![\d.])(\d++)\s++(?:data\s++)?(?:points|samples|values)\s++"
+    r"(?:at|of|equally|evenly|spaced|with)",
     re.IGNORECASE,
 )
 _UNIT = re.compile(
-    r"(?<![\w/^*])(?:[cm]?ms?/s(?:ec)?(?:\s*+[*^]{0,2}\s*+2|²|/s(?:ec)?)(?![\w/])|(?:in|ft)/s(?:ec)?"
-    r"(?:\s*+[*^]{0,2}\s*+2|²|/s(?:ec)?)(?![\w/])|gals?\b|g/10\b|(?:[cm]?m)\s?s\^?-2\b|g(?:'s)?(?![\w/.']))",
+    r"(?<![\w/^*])(?:[cm]?ms?/s(?:ec)?(?:\s*+[*^]{0,2}\s*+2|²|/s(?:ec)?)(?![\w/])|"
+    r"(?:in|ft)/s(?:ec)?(?:\s*+[*^]{0,2}\s*+2|²|/s(?:ec)?)(?![\w/])|"
+    r"gals?\b|g/10\b|(?:[cm]?m)\s?s\^?-2\b|g(?:'s)?(?![\w/.']))",
     re.IGNORECASE,
 )
 _STATES_UNIT = re.compile(
@@ -54,11 +56,13 @@ _UNITS_OF = re.compile(
     re.IGNORECASE,
 )
 _MEASURE = re.compile(
-    r"\b(?:pg[avd]|peak|max\w*+|min\w*+|rms|arias|threshold|scale|filter\w*+|corner|depth|sensitivity)\b",
+    r"\b(?:pg[avd]|peak|max\w*+|min\w*+|rms|arias|threshold|scale|filter\w*+|"
+    r"corner|depth|sensitivity)\b",
     re.IGNORECASE,
 )
 _MOTION = re.compile(
-    r"\b(?:(?P<acceleration>ac(?:c|c?[eé]l)\w*+|beschleunig\w*+)|(?P<velocity>vel(?:oc\w*+)?|vitesse)|"
+    r"\b(?:(?P<acceleration>ac(?:c|c?[eé]l)\w*+|beschleunig\w*+)|"
+    r"(?P<velocity>vel(?:oc\w*+)?|vitesse)|"
     r"(?P<displacement>disp\w*+|desplaz\w*+|spostament\w*+)|(?P<counts>counts?))\b",
     re.IGNORECASE,
 )

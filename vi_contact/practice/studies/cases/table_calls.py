@@ -166,7 +166,10 @@ def make_callee(
     """
     # A plain class has its annotations at __init__, a dataclass at its fields.
     plain_class = isinstance(function, type) and not is_dataclass(function)
-    quantity_of = read_quantities(function.__init__ if plain_class else function)  # type: ignore[misc]
+    annotated: Any = function
+    if plain_class:
+        annotated = annotated.__init__
+    quantity_of = read_quantities(annotated)
 
     # Parameters that collect others, such as *args, have no key.
     collecting = (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD)
