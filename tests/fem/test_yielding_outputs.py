@@ -179,6 +179,28 @@ def test_the_damping_of_a_loop() -> None:
 
 
 @pytest.mark.serial
+@pytest.mark.parametrize(("amplitude", "exact"), [(0.5, 0.08557360), (2.0, 0.22414209)])
+def test_masings_damping_of_a_hyperbola(amplitude: float, exact: float) -> None:
+    """Iwan's elements for tau = G gamma/(1 + gamma/r), sheared to and fro: the damping of the loop
+    is D = (2/pi) (2 ∫ tau/(tau_a a) - 1) of the hyperbola, but for the polygon of 60 points."""
+    r = 1e-3
+    strains = r * np.geomspace(1e-3, 10.0, 60)
+    soil = Iwan(2.6e7, 0.3, 2000.0, list(zip(strains, 1.0 / (1.0 + strains / r), strict=True)))
+    ends = amplitude * r * np.array([0.0, 1.0, -1.0, 1.0])
+    ways = [np.linspace(a, b, 401)[1:] for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    gamma = np.concatenate([[0.0], *ways, ways[1]])
+    state: Any = soil.start(np.zeros((1, 4)))
+    tau = [0.0]
+    for change in np.diff(gamma):
+        state, _ = soil.stress(np.array([[0.0, 0.0, 0.0, change / ROOT]]), state, tangent=False)
+        tau.append(float(state["sigma"][0, 3]) / ROOT)
+    found = engineering.loop_damping({"x": gamma, "y": np.array(tau)}, "x", "y")
+    assert found.damping[-1] == pytest.approx(exact, rel=0.02)
+    assert found.amplitude[-1] == pytest.approx(amplitude * r, rel=1e-12)
+    assert found.stiffness[-1] == pytest.approx(1e7 / (1.0 + amplitude), rel=0.01)
+
+
+@pytest.mark.serial
 def test_strains_and_stresses_are_computed_once_a_displacement(
     comm: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
