@@ -75,6 +75,7 @@ from .run import Schedule as Schedule
 from .run import SectionForces as SectionForces
 from .run import Solution as Solution
 from .run import Stepper as Stepper
+from .run import StressStrain as StressStrain
 from .run import Uplift as Uplift
 from .run import contact_values as contact_values
 from .run import cross_check as cross_check

@@ -134,15 +134,18 @@ class Stage:
             return internal
         return self.old[1] + (internal if self.end == 1.0 else self.end * internal)
 
-    def find_tangent(self, system: SemiDiscreteSystem, d: Array) -> Matrix:
+    def find_tangent(self, system: SemiDiscreteSystem, d: Array, *, whole: bool = False) -> Matrix:
         """Return the tangent (n, n) [N/m] of the internal force at the displacement of the stage.
 
         Args:
             system: the equations that are marched.
             d: the increment (n,).
+            whole: whether that of a material may be no symmetric matrix.
         """
         internal: Any = system.internal
         place = self.find_place(d)
+        if whole:
+            return internal.whole_tangent(place)  # type: ignore[no-any-return]
         if self.between is not None:
             return internal.between_tangent(self.between, place)  # type: ignore[no-any-return]
         return internal.tangent(place)  # type: ignore[no-any-return]
@@ -267,9 +270,14 @@ class NonlinearForces:
         """Return the increment (n,) at which passes begin; None for zero."""
         return self.stage.find_start(self.system)
 
-    def find_tangent(self, d: Array) -> Matrix:
-        """Return p'(u) (n, n) [N/m] at an increment (n,)."""
-        return self.stage.find_tangent(self.system, d)
+    def find_tangent(self, d: Array, *, whole: bool = False) -> Matrix:
+        """Return p'(u) (n, n) [N/m] at an increment.
+
+        Args:
+            d: the increment (n,).
+            whole: whether it may be no symmetric matrix; else its symmetric part.
+        """
+        return self.stage.find_tangent(self.system, d, whole=whole)
 
     def make_matrix(self, tangent: Matrix) -> EffectiveMatrix:
         """Return A of the step with a tangent in the place of K."""

@@ -34,4 +34,5 @@ from .mesh.tagged_mesh import read_mesh as read_mesh
 from .output.fields import XDMF as XDMF
 from .output.functions import as_function as as_function
 from .output.functions import read_function as read_function
+from .output.material_points import at_points as at_points
 from .output.vtkhdf import VTKHDF as VTKHDF

@@ -18,8 +18,8 @@ Sources: Drucker and Prager, Q. Appl. Math. 10 (1952) 157-165; de Souza Neto, Pe
 Computational Methods for Plasticity (2008), chapter 8.
 """
 
-from dataclasses import dataclass
-from math import cos, radians, sin, sqrt
+from dataclasses import dataclass, replace
+from math import atan, cos, degrees, radians, sin, sqrt, tan
 from typing import Annotated, Any
 
 import numpy as np
@@ -34,6 +34,7 @@ from .yielding import (
     PointState,
     YieldingMaterial,
     choose_flow,
+    find_share,
     judge_multiplier,
     largest_of,
 )
@@ -69,6 +70,21 @@ def check_strength(owner: str, cohesion: float, phi: float, psi: float) -> None:
                 f"{owner}: {name} is {angle:g} degrees; angles are in degrees and not in radians: "
                 f"give 0, or at least {SMALLEST:g}"
             )
+
+
+def divide_strength(
+    cohesion: float, phi: float, psi: float, factor: float
+) -> tuple[float, float, float]:
+    """Return c/F [Pa], atan(tan(phi)/F) and the smaller of psi and that [degrees].
+
+    Args:
+        cohesion: c [Pa].
+        phi: angle of friction [degrees].
+        psi: angle of dilatancy [degrees].
+        factor: F > 0.
+    """
+    less = degrees(atan(tan(radians(phi)) / factor))
+    return cohesion / factor, less, min(psi, less)
 
 
 @dataclass(frozen=True)
@@ -107,6 +123,16 @@ class DruckerPrager(YieldingMaterial):
         of_psi = 6.0 / (sqrt(3.0) * (3.0 + sign * t))
         return of_phi * s, of_phi * c, of_psi * t
 
+    @property
+    def symmetric(self) -> bool:
+        """Say whether tangents are symmetric: psi is phi."""
+        return self.psi == self.phi
+
+    def weaken(self, factor: float) -> "DruckerPrager":
+        """Return the material with c and tan phi over a factor, and psi at most that phi."""
+        c, phi, psi = divide_strength(self.cohesion, self.phi, self.psi, factor)
+        return replace(self, cohesion=c, phi=phi, psi=psi)
+
     def start(self, sigma: Array) -> dict[str, Array]:
         """Return the state of points that have never yielded; alpha is the plastic strain."""
         return {**super().start(sigma), "alpha": np.zeros(len(sigma))}
@@ -116,6 +142,10 @@ class DruckerPrager(YieldingMaterial):
         eta, strength, _ = self.cone
         sigma = state["sigma"]
         return norm(deviator(sigma)) / ROOT + eta * trace(sigma) / 3.0 - strength
+
+    def mobilised(self, state: PointState) -> Array:
+        """Return √J2 over its limit at the same mean stress (q,)."""
+        return find_share(self.f(state), norm(deviator(state["sigma"])) / ROOT)
 
     def stress(
         self, de: Array, old: PointState, tangent: bool = True

@@ -113,6 +113,11 @@ class Iwan(YieldingMaterial):
         beyond: Array = norm(state["parts"]) / ROOT - moduli * strains
         return beyond.max(axis=1)
 
+    def mobilised(self, state: PointState) -> Array:
+        """Return the stress of all elements over the largest they bear together (q,)."""
+        moduli, strains = self.elements
+        return norm(state["parts"].sum(axis=1)) / (ROOT * float(moduli @ strains))
+
     def stored(self, state: PointState) -> Array:
         """Return W (q,) [J/m³] of pressure, elements, and the work of the stress at rest."""
         moduli, _ = self.elements

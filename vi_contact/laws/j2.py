@@ -8,7 +8,7 @@ Undrained clay of the shear strength c_u has yield_stress = √3 c_u in plane st
 the surface is one linear equation (Simo and Hughes, Computational Inelasticity (1998), box 3.2).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from typing import Annotated
 
@@ -22,6 +22,8 @@ from .yielding import (
     PointState,
     YieldingMaterial,
     choose_flow,
+    equivalent_stress,
+    find_share,
     judge_multiplier,
     largest_of,
 )
@@ -45,6 +47,10 @@ class J2(YieldingMaterial):
     isotropic: Hardening = 0.0
     kinematic: Hardening = 0.0
 
+    def weaken(self, factor: float) -> "J2":
+        """Return the material with the yield stress over a factor."""
+        return replace(self, yield_stress=self.yield_stress / factor)
+
     def start(self, sigma: Array) -> dict[str, Array]:
         """Return the state of points that have never yielded: no hardening."""
         state = super().start(sigma)
@@ -54,6 +60,10 @@ class J2(YieldingMaterial):
         """Return the yield function (q,) [Pa]."""
         size = RADIUS * norm(deviator(state["sigma"]) - state["beta"])
         return size - self.yield_stress - self.isotropic * state["alpha"]
+
+    def mobilised(self, state: PointState) -> Array:
+        """Return √(3/2) |s - beta| over its limit (q,)."""
+        return find_share(self.f(state), equivalent_stress(state["sigma"] - state["beta"]))
 
     def stored(self, state: PointState) -> Array:
         """Return W (q,) [J/m³] with both hardenings."""

@@ -15,20 +15,21 @@ Sources: Clausen, Damkilde and Andersen, Comput. Struct. 85 (2007) 1795-1807; de
 and Owen, Computational Methods for Plasticity (2008), section 8.2.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos, radians, sin
 from typing import Annotated, Any
 
 import numpy as np
 
 from ..core.algebra import Array
-from .drucker_prager import BELOW_NINETY, Cohesion, check_strength
+from .drucker_prager import BELOW_NINETY, Cohesion, check_strength, divide_strength
 from .mandel import PAIRS, find_principal, make_basis, norm, to_tensors
 from .yielding import (
     ROUND_OFF,
     PointState,
     YieldingMaterial,
     choose_flow,
+    find_share,
     judge_multiplier,
     largest_of,
 )
@@ -94,6 +95,16 @@ class MohrCoulomb(YieldingMaterial):
         G = self.shear_modulus
         return self.bulk_modulus - 2.0 / 3.0 * G + 2.0 * G * np.eye(3)
 
+    @property
+    def symmetric(self) -> bool:
+        """Say whether tangents are symmetric: psi is phi."""
+        return self.psi == self.phi
+
+    def weaken(self, factor: float) -> "MohrCoulomb":
+        """Return the material with c and tan phi over a factor, and psi at most that phi."""
+        c, phi, psi = divide_strength(self.cohesion, self.phi, self.psi, factor)
+        return replace(self, cohesion=c, phi=phi, psi=psi)
+
     def start(self, sigma: Array) -> dict[str, Array]:
         """Return the state of points that have never yielded; alpha is the plastic strain."""
         return {**super().start(sigma), "alpha": np.zeros(len(sigma))}
@@ -102,6 +113,11 @@ class MohrCoulomb(YieldingMaterial):
         """Return the yield function (q,) [Pa]."""
         values, _ = find_principal(state["sigma"])
         return self._beyond(values)
+
+    def mobilised(self, state: PointState) -> Array:
+        """Return s1 - s3 over 2 c cos phi - (s1 + s3) sin phi (q,)."""
+        values, _ = find_principal(state["sigma"])
+        return find_share(self._beyond(values), values[:, 0] - values[:, 2])
 
     def _beyond(self, values: Array) -> Array:
         """Return f (q,) [Pa] of sorted principal stresses (q, 3)."""

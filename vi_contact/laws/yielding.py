@@ -20,12 +20,14 @@ Source: Simo and Hughes, Computational Inelasticity (1998), chapters 2 and 3.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import sqrt
 from typing import Annotated, Any
 
 import numpy as np
 
 from ..core.algebra import Array
 from ..core.arguments import check_fields
+from ..core.errors import InputError
 from ..core.quantities import RATIO, Between, Positive, Unit
 from .mandel import deviator, dot, elastic_matrix, norm, trace
 from .materials import DampedBy, Density, LinearElastic
@@ -70,6 +72,11 @@ class YieldingMaterial:
         return LinearElastic(self.E, self.nu, self.rho, self.xi)
 
     @property
+    def symmetric(self) -> bool:
+        """Say whether the tangents of the law are symmetric, as those of flow along the normal."""
+        return True
+
+    @property
     def shear_modulus(self) -> float:
         """Return G = E / (2 (1 + nu)) [Pa]."""
         return self.E / (2.0 * (1.0 + self.nu))
@@ -78,6 +85,24 @@ class YieldingMaterial:
     def bulk_modulus(self) -> float:
         """Return K = E / (3 (1 - 2 nu)) [Pa]."""
         return self.E / (3.0 * (1.0 - 2.0 * self.nu))
+
+    def weaken(self, factor: float) -> "YieldingMaterial":
+        """Return the material with its strength divided by a factor: itself where none yields.
+
+        A law of your own says its own.
+
+        Args:
+            factor: F > 0.
+
+        Raises:
+            InputError: the law does not say it.
+        """
+        if type(self) is YieldingMaterial:
+            return self
+        raise InputError(
+            f"{type(self).__name__} does not say what it is with another strength; give it a "
+            "method weaken(factor), or take J2, DruckerPrager or MohrCoulomb"
+        )
 
     def stiffness(self, n: int) -> Array:
         """Return C (n, n) [Pa] of n = 4 or 6 components."""
@@ -118,6 +143,18 @@ class YieldingMaterial:
     def f(self, state: PointState) -> Array:
         """Return the yield function (q,) [Pa], which is never above zero."""
         return np.full(len(state["sigma"]), -np.inf)
+
+    def mobilised(self, state: PointState) -> Array:
+        """Return the share of its strength that a point bears (q,), a number from 0 to 1.
+
+        It is q/(q - f): the stress that f measures over its limit at the same mean stress. Here q
+        is the equivalent stress; a law whose f measures another stress says its own. A point
+        without any strength left, as one at the tip of a cone, has 1.
+
+        Args:
+            state: of the points.
+        """
+        return find_share(self.f(state), equivalent_stress(state["sigma"]))
 
     def stored(self, state: PointState) -> Array:
         """Return W (q,) [J/m³], ½ sigma : C⁻¹ sigma here."""
@@ -168,6 +205,23 @@ class YieldingMaterial:
         beyond = np.maximum(self.f(new), 0.0) / stress
         gained = np.maximum(-self.dissipation(de, old, new), 0.0) / (stress * strain)
         return np.maximum(beyond, gained)
+
+
+def equivalent_stress(sigma: Array) -> Array:
+    """Return von Mises' √(3/2) |dev sigma| (…,) [Pa] of stresses (…, n) [Pa]."""
+    return sqrt(1.5) * norm(deviator(sigma))
+
+
+def find_share(f: Array, size: Array) -> Array:
+    """Return size/(size - f) (q,), the share of a limit: 1 where there is no limit left.
+
+    Args:
+        f: yield function (q,) [Pa], size less the limit.
+        size: of the stress that f measures (q,) [Pa].
+    """
+    limit = size - f
+    share = np.divide(size, limit, out=np.ones_like(size), where=limit > 0.0)
+    return np.minimum(share, 1.0)
 
 
 def choose_flow(candidates: list[Array]) -> Array:

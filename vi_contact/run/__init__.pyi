@@ -21,6 +21,7 @@ from .recorders import Racking as Racking
 from .recorders import Reactions as Reactions
 from .recorders import Resultants as Resultants
 from .recorders import SectionForces as SectionForces
+from .recorders import StressStrain as StressStrain
 from .recorders import Uplift as Uplift
 from .rigid_blocks import RigidBlocks as RigidBlocks
 from .rigid_blocks import rigid_blocks as rigid_blocks

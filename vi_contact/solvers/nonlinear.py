@@ -18,6 +18,9 @@ converge linearly and are accelerated (``acceleration``). K is replaced by the t
 the passes that are still expected would cost more than a new factor, counted by unknowns and never
 by a clock, and where a pass has no smaller residual than the best one before it.
 
+A tangent that is not symmetric (psi < phi) is taken as a whole where there is no contact, as its
+LU is all that such a pass needs; beside contact its symmetric part leads the passes.
+
 From such a pass only a part may be gone. Between d_k and d_k + delta, which both are outside of the
 obstacle, the potential of all forces falls at first, if A is positive definite, with the slope
 -(rest - B_tᵀ scale r_t)·delta. The whole way is gone where its slope at the end is negative or
@@ -30,6 +33,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
 from math import log as ln
+from typing import Any
 
 import numpy as np
 
@@ -40,7 +44,9 @@ from ..core.stage import NonlinearForces, add_increment
 from ..core.step import Solver, StepProblem, StepResult
 from ..core.verify import kkt_residual
 from .acceleration import Anderson
+from .automatic import Automatic
 from .certified import ADVICE, NEAR, CertifiedSolver
+from .condensed import Condensed
 from .line_search import FLAT, find_finite, find_flat
 from .passes import Certified, Passes, certify, pose_about
 
@@ -157,12 +163,32 @@ class NonlinearSolver:
         self.counts: list[int] = []
         self.A = A
         self._reference = self._prepare(A)
+        # Whole tangents that are not symmetric: where nothing but a factor is made of them.
+        internal = problem.system.internal
+        self._takes_whole = (
+            problem.surface.total == 0
+            and not getattr(internal, "symmetric", True)
+            and getattr(problem.system.algebra, "keeps_whole", False)
+            and isinstance(solvers[0], Automatic | Condensed)
+        )
         self._cost = _count_passes_of_a_factor(problem)
 
     def _prepare(self, A: EffectiveMatrix) -> CertifiedSolver:
         """Return the certified solver of linear steps with a matrix."""
         return CertifiedSolver(
             self._problem, A, self._scale, self._solvers, self._tolerance, advice=self._advice
+        )
+
+    def _prepare_whole(self, A: EffectiveMatrix) -> CertifiedSolver:
+        """Return the certified solver of linear steps without contact, by the LU of a tangent.
+
+        Args:
+            A: which is not symmetric.
+        """
+        algebra: Any = A.algebra
+        whole = EffectiveMatrix(A.matrix, algebra.unsymmetric(), space=A.space, inertia=A.inertia)
+        return CertifiedSolver(
+            self._problem, whole, self._scale, [Condensed()], self._tolerance, advice=self._advice
         )
 
     def solve(self, step: StepProblem) -> Certified:
@@ -263,10 +289,11 @@ class NonlinearSolver:
         """Go on with the tangent of where the walk is. Collective."""
         self.tangents += 1
         walk.solver = self._reference  # the tangent before gives its memory back
-        tangent = walk.forces.find_tangent(walk.here.d)
+        tangent = walk.forces.find_tangent(walk.here.d, whole=self._takes_whole)
         if walk.care:
             tangent = self._brace(walk, tangent, SHARES[walk.care])
-        walk.solver = self._prepare(walk.forces.make_matrix(tangent))
+        A = walk.forces.make_matrix(tangent)
+        walk.solver = self._prepare_whole(A) if self._takes_whole else self._prepare(A)
         walk.acceleration = self._make_acceleration()
         walk.tangent_due = False
 

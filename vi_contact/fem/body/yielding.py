@@ -7,12 +7,13 @@ u begins from it anew, so that a step that is thrown away leaves nothing behind.
 what the points know at u, and ``go_on`` makes the force of a body that stands there.
 
 Tangents of laws whose flow is not along the normal of the yield surface (psi < phi) are not
-symmetric. The matrix is made of their symmetric part: it only leads the iterations of a step, whose
-answer is certified without it, and all solvers for symmetric matrices stay.
+symmetric. Beside contact the matrix is made of their symmetric part: it only leads the iterations
+of a step, whose answer is certified without it, and all solvers for symmetric matrices stay. A body
+without contact takes the whole tangent.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -23,13 +24,14 @@ from ...core.checks import describe_point, on_all, refuse
 from ...core.internal import MATERIAL
 from ...laws.mandel import PAIRS, ROOT, norm
 from ...laws.materials import LinearElastic
-from ...laws.yielding import ROUND_OFF, PointState, YieldingMaterial
+from ...laws.yielding import ROUND_OFF, PointState, YieldingMaterial, equivalent_stress
 from .. import compat
 from ..matrices.petsc_algebra import PetscAlgebra
 from .space import FemSpace
-from .strain_points import StrainPoints
+from .strain_points import StrainPoints, find_known
 
-KEPT = 2  # displacements whose stresses are remembered: the end of a step is asked for repeatedly
+KEPT = 3  # displacements whose stresses are remembered: the end of a step is asked for repeatedly
+ROUNDED = 1e-10  # of the strain: a plastic one that is the rounding of many steps
 TENSION = "give a stress that the material can carry, or a stronger material"
 
 
@@ -168,6 +170,48 @@ class YieldingForce:
             kept += sum(values.nbytes for values in state.values())
         return kept / max(self._points.cells * self._points.each, 1)
 
+    @property
+    def points(self) -> StrainPoints:
+        """Return the points of integration."""
+        return self._points
+
+    def tell(self, name: str) -> Array:
+        """Return a quantity of the points where the body stands. Collective.
+
+        Args:
+            name: "stress" [Pa] or "strain" (points, n) in Mandel's notation, or "equivalent_stress"
+                [Pa], "plastic_strain" or "mobilised_strength" (points,).
+        """
+        if name == "strain":
+            return self._strain
+        eps = self._strain  # on all ranks, also on those without points
+        values = np.zeros(eps.shape if name == "stress" else len(eps))
+        for part, state, start in zip(self._parts, self._states, self._virgin, strict=True):
+            if name == "stress":
+                own = state["sigma"]
+            elif name == "equivalent_stress":
+                own = equivalent_stress(state["sigma"])
+            elif name == "mobilised_strength":
+                own = part.law.mobilised(state)
+            else:
+                own = _find_plastic(part.law, eps[part.points], state["sigma"] - start["sigma"])
+            values[part.points] = own
+        return values
+
+    def weaken(self, factor: float) -> "YieldingForce":
+        """Return the force of a new body whose laws have the strength of these over a factor.
+
+        Args:
+            factor: F > 0, by which c and tan phi are divided.
+
+        Raises:
+            InputError: a law does not say what it is with another strength.
+        """
+        parts = []
+        for part in self._parts:
+            parts.append(replace(part, law=part.law.weaken(factor)))
+        return YieldingForce(self._space, self._points, parts, self._virgin)
+
     # What is asked for
     # ----------------------------------------------------------------------------------------------
 
@@ -186,6 +230,16 @@ class YieldingForce:
         D = self._compute_tangents(self._points.strain(u) - self._strain)
         symmetric = 0.5 * (D + D.swapaxes(1, 2))
         return self._algebra.store(self._points.free_matrix(symmetric))
+
+    @property
+    def symmetric(self) -> bool:
+        """Say whether p' is a symmetric matrix: whether all laws flow along their normals."""
+        return all(part.law.symmetric for part in self._parts)
+
+    def whole_tangent(self, u: Array) -> Matrix:
+        """Return p'(u) (n, n) [N/m], which need not be symmetric. Collective."""
+        D = self._compute_tangents(self._points.strain(u) - self._strain)
+        return self._algebra.store(self._points.free_matrix(D))
 
     def dissipation(self, u: Array) -> float:
         """Return what the way to u dissipates [J], of all ranks. Collective."""
@@ -245,14 +299,16 @@ class YieldingForce:
 
     def _reach(self, u: Array) -> Reached:
         """Return what the points know at a displacement. Collective."""
-        for known in self._known:
-            if np.array_equal(known.u, u):
-                return known
+        comm = self._space.comm
+        stands = [self._u, *(known.u for known in self._known)]
+        place = find_known(comm, u, stands)
+        if place:
+            return self._known[place - 1]
         way = self._points.strain(u) - self._strain
-        if np.array_equal(self._u, u):  # where it stands nothing flows, not by rounding either
+        if place == 0:  # where it stands nothing flows, not by rounding either
             states = list(self._states)
         else:
-            states = on_all(self._space.comm, "a material that yields", lambda: self._follow(way))
+            states = on_all(comm, "a material that yields", lambda: self._follow(way))
         sigma = np.zeros_like(way)
         for part, state in zip(self._parts, states, strict=True):
             sigma[part.points] = state["sigma"]
@@ -279,6 +335,20 @@ class YieldingForce:
             return D
 
         return on_all(self._space.comm, "a material that yields", ask)
+
+
+def _find_plastic(law: YieldingMaterial, eps: Array, change: Array) -> Array:
+    """Return √(2/3) |eps - C⁻¹ Δsigma| (q,), zero where it is rounding.
+
+    Args:
+        law: the material.
+        eps: strain since the start (q, n).
+        change: of the stress since the start (q, n) [Pa].
+    """
+    elastic = np.linalg.solve(law.stiffness(eps.shape[-1]), change.T).T
+    size = norm(eps - elastic)
+    rounding = ROUNDED * (norm(eps) + norm(elastic))
+    return np.where(size > rounding, np.sqrt(2.0 / 3.0) * size, 0.0)
 
 
 def make_parts(

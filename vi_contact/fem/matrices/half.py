@@ -108,6 +108,8 @@ class Replaced(PetscMatrix):
 class CompactAlgebra(PetscAlgebra):
     """Make compact matrices of symmetric ones; nodes have ``dimension`` unknowns."""
 
+    keeps_whole = False
+
     def __init__(self, comm: Any, dimension: int) -> None:
         super().__init__(comm)
         self._dimension = dimension

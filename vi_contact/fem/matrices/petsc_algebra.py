@@ -292,13 +292,19 @@ def _default_options(values: Mapping[str, object]) -> Iterator[None]:
 class PetscAlgebra:
     """Make and combine PETSc matrices on one communicator.
 
-    ``symmetric``: whether those of its system are.
+    ``symmetric``: whether those of its system are. ``keeps_whole``: whether it stores matrices that
+    are not, as a tangent.
     """
 
     symmetric = True
+    keeps_whole = True
 
     def __init__(self, comm: Any) -> None:
         self.comm = MpiComm(comm)
+
+    def unsymmetric(self) -> "UnsymmetricAlgebra":
+        """Return the algebra of matrices that are not symmetric, on the same ranks."""
+        return UnsymmetricAlgebra(self.comm.mpi)
 
     def combine(self, terms: Sequence[tuple[float, Matrix]]) -> Matrix:
         """Return the sum of factor times matrix over the terms (factor, matrix). Collective."""

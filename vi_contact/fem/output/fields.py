@@ -34,6 +34,7 @@ from ...core.files import (
     open_hdf5,
     write_atomically,
 )
+from ...core.internal import remembers
 from ...core.own_files import inner_folder, make_inner_folder, remove
 from ...core.problem import ContactProblem
 from ...core.quantities import Positive
@@ -111,7 +112,13 @@ _CELLS = {
 
 _VECTORS = ("u", "v", "a")
 _RUBBING = ("contact_traction_t", "slip")
-TAKEN = (*_VECTORS, *_RUBBING, "contact_pressure", "contact_status", "von_mises")
+_POINTS = {
+    "von_mises": "equivalent_stress",
+    "plastic_strain": "plastic_strain",
+    "mobilised_strength": "mobilised_strength",
+}
+"""What frames of a body that yields have for each cell, and how its points call it."""
+TAKEN = (*_VECTORS, *_RUBBING, "contact_pressure", "contact_status", *_POINTS)
 
 
 @dataclass(frozen=True)
@@ -208,7 +215,7 @@ class FrameValues:
         comm: of the ranks.
         names: of the nodal vectors.
         grid: on rank 0; on others its arrays are empty.
-        has_stress: whether frames have the von Mises stress.
+        cell_names: of the numbers of each cell, the user's apart.
         own: the user's Functions, None without.
     """
 
@@ -237,7 +244,12 @@ class FrameValues:
                 self.own = own_functions.OwnFunctions(owner, problem, functions)
         self.comm = space.comm
         self.names = _VECTORS + (_RUBBING if problem.frictional else ())
-        self.has_stress = cells.von_mises is not None
+        self._yields = remembers(problem.system.internal) and not isinstance(space, MatrixSpace)
+        self.cell_names: tuple[str, ...] = ()
+        if self._yields:
+            self.cell_names = tuple(_POINTS)
+        elif cells.von_mises is not None:
+            self.cell_names = ("von_mises",)
         self._problem = problem
         self._space = space
         self._cell_numbers = cells.numbers
@@ -268,7 +280,7 @@ class FrameValues:
             space.expand(problem.cartesian(x), state.t, derivative)
             for derivative, x in enumerate((state.u, state.v, acceleration))
         ]
-        cellwise = {}
+        cellwise = self._gather_points(state) if self._yields else {}
         if self._von_mises is not None:
             stress = self._von_mises(vectors[0], state.t)
             cellwise["von_mises"] = on_first(space.comm, self._cell_numbers, stress)
@@ -294,6 +306,17 @@ class FrameValues:
                 place = cellwise if self.own.kinds[name].in_cells else nodal
                 place[name] = values
         return nodal, cellwise
+
+    def _gather_points(self, state: State) -> dict[str, Array]:
+        """Return the cell means of a body that yields on rank 0, by name. Collective."""
+        from . import material_points  # late, as compat
+
+        standing = material_points.stand(self._problem, state)
+        cellwise = {}
+        for name, quantity in _POINTS.items():
+            means = material_points.compute_cell_means(standing, quantity)
+            cellwise[name] = on_first(self.comm, self._cell_numbers, means)
+        return cellwise
 
 
 class XDMFWriter:
@@ -446,8 +469,7 @@ class XDMFWriter:
         attributes = [describe(name, "Node", nodes, 3) for name in self._values.names]
         attributes.append(describe("contact_pressure", "Node", nodes))
         attributes.append(describe("contact_status", "Node", nodes, number="Int", size=4))
-        if self._values.has_stress:
-            attributes.append(describe("von_mises", "Cell", cells))
+        attributes += [describe(name, "Cell", cells) for name in self._values.cell_names]
         for name, own_kind in self._find_own_kinds(k).items():
             shape = (cells if own_kind.in_cells else nodes, *own_kind.components)
             attributes.append(describe(name, "Cell" if own_kind.in_cells else "Node", *shape))
@@ -592,7 +614,7 @@ def _cells_of_body(owner: str, problem: ContactProblem) -> Cells:
     space = space_of(owner, problem.system)
     if space.forms.tells_stress:
         warn_of_other_matrices(f"{owner}, von_mises", problem.system, "K")
-    elif space.comm.rank == 0:
+    elif space.comm.rank == 0 and not remembers(problem.system.internal):
         log.info(
             "%s: forms=… have no stress, so frames have no von_mises: give fem.Forms(…, stress=)",
             owner,

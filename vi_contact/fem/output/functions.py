@@ -22,6 +22,7 @@ from ...core.algebra import Array, Indices
 from ...core.checks import flag, instance, number, optional, quote, refuse
 from ...core.errors import InputError, is_of_machine
 from ...core.files import FIELDS, FIELDS_INDEX, list_frames, on_root, open_hdf5
+from ...core.internal import remembers
 from ...core.own_files import inner_folder, is_own, read_bytes
 from ...core.problem import ContactProblem
 from ...core.state_checks import check_problem_given, check_sizes
@@ -29,6 +30,7 @@ from ...core.step import State
 from ...core.vtkhdf import FIELDS_VTKHDF, open_series
 from .. import compat
 from ..body.space import FemSpace, space_of, warn_of_other_matrices
+from . import material_points
 from .fields import (
     between,
     blocks_of_conditions,
@@ -37,7 +39,16 @@ from .fields import (
     nodal_contact,
 )
 
-NAMES = ("u", "v", "stress", "contact_pressure", "contact_traction_t", "slip", "contact_gap")
+NAMES = (
+    "u",
+    "v",
+    "stress",
+    "contact_pressure",
+    "contact_traction_t",
+    "slip",
+    "contact_gap",
+    *material_points.SCALARS,
+)
 ACCURACY = 1e-13  # of a projection, in its residual
 SAME = 1e-9  # of the size of the mesh, and of the longest time
 
@@ -59,7 +70,10 @@ def as_function(
         state: of simulate, march, static_equilibrium or quasi_static of this problem.
         name: "u" [m], "v" [m/s], "stress" [Pa] (d, d), "contact_pressure" [Pa], "contact_gap" [m],
             or a vector along the axes: "contact_traction_t" [Pa], the tangential traction of the
-            body on its support, and "slip" [m], its tangential displacement there.
+            body on its support, and "slip" [m], its tangential displacement there. Of a body that
+            yields also "equivalent_stress" [Pa], "plastic_strain" and "mobilised_strength", as of
+            ``at_points``: these and its stress are means of the points, constant in each cell or,
+            if continuous, P1 or Q1.
         continuous: whether the stress is projected onto P1, Q1, P2 or Q2, ∫ sigma_h : tau = ∫
             sigma(u) : tau; else onto discontinuous fields.
 
@@ -68,6 +82,10 @@ def as_function(
     """
     space = _check_request("as_function", problem, name, continuous)
     check_sizes("as_function", problem, state)
+    if name in material_points.SCALARS:
+        material_points.refuse_elastic("as_function", problem, name)
+    if name in material_points.NAMES and remembers(problem.system.internal):
+        return material_points.make_function(problem, state, name, continuous)
     if name in ("u", "v", "stress"):
         if name == "v":
             nodal = space.expand(problem.cartesian(state.v), state.t, 1)
@@ -155,6 +173,11 @@ def read_function(
         int,
         "give its number, 0 for the first and -1 for the last",
     )
+    if name in material_points.SCALARS:
+        raise InputError(
+            f"read_function: frames have {quote(name)} for each cell, which is no Function; give "
+            "as_function a state"
+        )
     if name == "contact_gap":
         raise InputError(
             "read_function: frames have no gap; give as_function a state, or record Contact()"

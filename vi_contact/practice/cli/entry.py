@@ -43,11 +43,13 @@ def build_parser(command: str = "") -> argparse.ArgumentParser:
         from .motion import add_motion_commands
         from .pictures import add_picture_commands
         from .post import add_post_commands
+        from .strength import add_strength_command
         from .validate import add_validate_command
 
         add_motion_commands(commands)
         add_picture_commands(commands)
         add_post_commands(commands)
+        add_strength_command(commands)
         add_validate_command(commands)
     return top
 

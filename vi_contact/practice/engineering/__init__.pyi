@@ -4,6 +4,9 @@ from ...run.modal import lowest_frequency as lowest_frequency
 from ...run.recorders.contact_parts import contact_summary as contact_summary
 from .checks.comparison import Check as Check
 from .checks.comparison import Comparison as Comparison
+from .cycle_damping import CycleDamping as CycleDamping
+from .cycle_damping import energy_damping as energy_damping
+from .cycle_damping import loop_damping as loop_damping
 from .floor_spectra import TransferFunction as TransferFunction
 from .floor_spectra import floor_spectrum as floor_spectrum
 from .floor_spectra import recorded_motion as recorded_motion

@@ -10,4 +10,5 @@ from .records import plot_spectra as plot_spectra
 from .records import plot_transfer as plot_transfer
 from .stones import plot_joints as plot_joints
 from .stones import plot_mechanism as plot_mechanism
+from .strength_reduction import plot_strength_reduction as plot_strength_reduction
 from .studies import plot_ida as plot_ida

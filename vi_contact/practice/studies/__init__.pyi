@@ -10,3 +10,5 @@ from .profiles import profile as profile
 from .refinement import refine as refine
 from .report import comparisons as comparisons
 from .report import report as report
+from .strength_reduction import StrengthReduction as StrengthReduction
+from .strength_reduction import strength_reduction as strength_reduction

@@ -8,6 +8,7 @@ from .racking import Racking as Racking
 from .reactions import Reactions as Reactions
 from .resultants import Resultants as Resultants
 from .section_forces import SectionForces as SectionForces
+from .stress_strain import StressStrain as StressStrain
 from .uplift import Uplift as Uplift
 
 __all__: list[str]
