@@ -31,6 +31,7 @@ from ...core.quantities import Unit
 from ...core.system import Load, SemiDiscreteSystem
 from ...core.timing import report_time
 from ...laws.free_motions import Unheld, floats
+from ...laws.geostatic import Geostatic
 from ...laws.materials import Damping, Section
 from ...laws.yielding import YieldingMaterial
 from .. import compat
@@ -92,7 +93,7 @@ def assemble(
     degree: int = 1,
     quadrature_degree: int | None = None,
     integration: str = "full",
-    initial_stress: Annotated[Callable[[Array], Array] | None, Unit("Pa")] = None,
+    initial_stress: Annotated[Geostatic | Callable[[Array], Array] | None, Unit("Pa")] = None,
     space: Any = None,
     bcs: Any = (),
 ) -> SemiDiscreteSystem:
@@ -128,7 +129,7 @@ def assemble(
         integration: "full", or "selective" for nearly incompressible bodies of quadrilaterals or
             hexahedra, where each cell has one mean value of tr eps (``dilatation``). "bbar" is
             the like for materials that yield.
-        initial_stress: of a body that yields, at the displacement zero: points (k, d) [m] ->
+        initial_stress: of a body that yields, at the displacement zero: ``laws.Geostatic``, or points (k, d) [m] ->
             components (k, 4) xx, yy, zz, xy or (k, 6) xx, yy, zz, xy, yz, xz [Pa], tension
             positive. Loads should hold it in equilibrium.
         initial_displacement: constant or points (k, d) -> (k, d) (eqs. 10, 10a), or (cells, value)

@@ -5,6 +5,7 @@ M is that of the densities. K is the elastic stiffness, the reference of the ste
 
 import logging
 from collections.abc import Callable, Sequence
+from math import radians, sin
 from typing import Any
 
 import ufl
@@ -14,6 +15,7 @@ from ...core.errors import InputError
 from ...core.internal import InternalForce
 from ...laws.drucker_prager import DruckerPrager
 from ...laws.materials import Damping, LinearElastic, PlaneStress, Section
+from ...laws.mohr_coulomb import MohrCoulomb
 from ...laws.yielding import YieldingMaterial
 from .. import compat
 from .forms import ElasticForms
@@ -61,6 +63,8 @@ class YieldingForms(ElasticForms):
         elastic = [(where, getattr(given, "elastic", given)) for where, given in materials]
         super().__init__(space, elastic, section, damping)
         warn_of_locking(space, integration)
+        self.integration = integration
+        self._given = materials
         self._points = StrainPoints(
             space,
             section.thickness,
@@ -69,9 +73,16 @@ class YieldingForms(ElasticForms):
         )
         self._parts = make_parts(self._points, materials)
         self._betas = [damping.coefficients(given)[1] for _, given in elastic]
+        if initial_stress is None:
+            _warn_of_weak_ratio(space, [given for _, given in materials])
         starts = make_starts(space, self._points, self._parts, initial_stress)
         self.internal: InternalForce = YieldingForce(space, self._points, self._parts, starts)
         self.notes = describe([given for _, given in materials], integration)
+
+    @property
+    def given_materials(self) -> list[tuple[Any, Any]]:
+        """Return (local cells, material) as they were given, with those that yield."""
+        return self._given
 
     def matrix(self, name: str) -> Any:
         """Assemble the full matrix M, K, or C (PETSc), before elimination."""
@@ -141,6 +152,27 @@ def warn_of_locking(space: FemSpace, integration: str) -> None:
         log.warning(LOCKS, "first-order triangles and tetrahedra", "degree=2")
     else:
         log.warning(LOCKS, "first-order cells", "integration='bbar' or degree=2")
+
+
+def _warn_of_weak_ratio(space: FemSpace, materials: Sequence[Any]) -> None:
+    """Warn, on rank 0, of soil without cohesion that level ground yields under its own weight.
+
+    Elastic ground at rest has the ratio nu/(1 - nu) of stresses, which must not be below Ka.
+    """
+    for given in materials:
+        if not isinstance(given, DruckerPrager | MohrCoulomb) or given.cohesion or space.comm.rank:
+            continue
+        sine = sin(radians(given.phi))
+        active = (1.0 - sine) / (1.0 + sine)
+        elastic = given.nu / (1.0 - given.nu)
+        if elastic < active:
+            log.warning(
+                "%s: level ground yields under its own weight, as nu/(1 - nu) = %.3g is below "
+                "Ka = %.3g: give a larger nu, or a stress at rest (initial_stress)",
+                type(given).__name__,
+                elastic,
+                active,
+            )
 
 
 def describe(materials: Sequence[Any], integration: str) -> tuple[str, ...]:
