@@ -129,7 +129,8 @@ def assemble(
         integration: "full", or "selective" for nearly incompressible bodies of quadrilaterals or
             hexahedra, where each cell has one mean value of tr eps (``dilatation``). "bbar" is
             the like for materials that yield.
-        initial_stress: of a body that yields, at the displacement zero: ``laws.Geostatic``, or points (k, d) [m] ->
+        initial_stress: of a body that yields, at the displacement zero: ``laws.Geostatic``, or
+            a function, points (k, d) [m] ->
             components (k, 4) xx, yy, zz, xy or (k, 6) xx, yy, zz, xy, yz, xz [Pa], tension
             positive. Loads should hold it in equilibrium.
         initial_displacement: constant or points (k, d) -> (k, d) (eqs. 10, 10a), or (cells, value)

@@ -143,7 +143,7 @@ class ElasticForms:
     @property
     def given_materials(self) -> list[tuple[Any, Any]]:
         """Return (local cells, material) as they were given; materials that yield among them."""
-        return self.materials
+        return list(self.materials)
 
     def cellwise(self, name: str) -> Array:
         """Return the means of a field over the local cells, (cells,)."""

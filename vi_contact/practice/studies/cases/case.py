@@ -379,7 +379,7 @@ class Case:
             from ....run.static import static_equilibrium  # late: other runs need none of it
 
             static_solver = solver.primary if isinstance(solver, CrossChecked) else solver
-            state = static_equilibrium(problem, solver=static_solver)
+            state = static_equilibrium(problem, solver=static_solver, state=parts.begins)
         return arguments | {
             "problem": problem,
             "scheme": self._build_scheme(),

@@ -20,11 +20,18 @@ import numpy as np
 from ....core.algebra import Array
 from ....core.errors import InputError
 from ....core.files import on_root, write_atomically
+from ....core.internal import remembers
 from ....core.own_files import inner_folder, is_own, make_inner_folder, read_text
 from ....core.problem import ContactProblem
 from ....core.state_checks import initial_state
 from ....core.step import State
-from ....fem.body.released_supports import begin_from, find_removed_support, release, same_supports
+from ....fem.body.released_supports import (
+    begin_from,
+    find_internal_force,
+    find_removed_support,
+    release,
+    same_supports,
+)
 from ....fem.mesh.communicators import MpiComm
 from ....run.files.checkpoint import read_state_checksum
 from ....run.files.folder import (
@@ -303,7 +310,8 @@ def _enter(stage: Stage, reached: Reached, comm: Any) -> tuple[Reached, Parts, S
                 "the supports of that one between them, or change supports before the motion"
             )
         force = begun.system.load.constant - problem.system.load.constant
-        name, newtons = find_removed_support(before, begun, np.asarray(force))
+        elastic = find_internal_force(begun, first, begun.system.u0)
+        name, newtons = find_removed_support(before, begun, np.asarray(force), elastic)
         if name and not stage.release:
             raise InputError(
                 f"it removes the support '{name}', which carries {newtons:.4g} N: give release = "
@@ -311,5 +319,7 @@ def _enter(stage: Stage, reached: Reached, comm: Any) -> tuple[Reached, Parts, S
             )
     except InputError as error:
         raise InputError(f"{stage.label}: {error}") from error
-    begun_parts = replace(parts, system=begun.system)
+    # Materials that remember go on from there; a linear body is found from its displacements.
+    begins = first if remembers(begun.system.internal) else None
+    begun_parts = replace(parts, system=begun.system, begins=begins)
     return replace(reached, force=force), begun_parts, None if stage.static else first

@@ -24,6 +24,7 @@ from ....core import (
     Recorder,
     Scheme,
     Solver,
+    State,
 )
 from ....core.arguments import check_arguments
 from ....core.corners import FEATURE_ANGLE
@@ -463,6 +464,7 @@ class Parts:
         mass: the law of a body without a mesh, or with a layer.
         tables: how many parts of the surface each [[contact]] has: one, or one for each joint that
             is found.
+        begins: where a static stage begins; None: in the displacements at the start.
     """
 
     system: SemiDiscreteSystem
@@ -472,6 +474,7 @@ class Parts:
     moved: bool = False
     mass: MassLaw | None = None
     tables: tuple[int, ...] = ()
+    begins: State | None = None
 
     @property
     def steady(self) -> bool:
