@@ -18,7 +18,7 @@ from typing import Any
 from ..core.algebra import Array, EffectiveMatrix, Matrix
 from ..core.errors import StepFailure
 from ..core.problem import ContactProblem
-from ..core.stage import NonlinearForces, add_increment
+from ..core.stage import NonlinearForces
 from ..core.step import Solver, StepProblem, StepResult
 from ..core.verify import kkt_residual
 from ..solvers.certified import NEAR
@@ -134,7 +134,7 @@ class Settling:
             yield Certified(result, self._judge(step, forces, result), there.escalated)
 
     def _judge(self, step: StepProblem, forces: Any, result: StepResult) -> Any:
-        """Return the certificate of the stage itself, with the balance of every body as a rigid one.
+        """Return the certificate of the stage itself, with the balance of rigid bodies.
 
         Args:
             step: the stage.

@@ -41,6 +41,7 @@ from ..matrices.petsc_rows import transfer
 from ..mesh.communicators import MpiComm, give_back
 from ..mesh.numbering import number_nodes
 from ..mesh.tagged_mesh import Cells, Facets
+from .absent import find_absent, hold_absent, let_remember
 from .assembly_checks import (
     check_body,
     check_initial,
@@ -94,6 +95,7 @@ def assemble(
     quadrature_degree: int | None = None,
     integration: str = "full",
     initial_stress: Annotated[Geostatic | Callable[[Array], Array] | None, Unit("Pa")] = None,
+    absent: Cells | Sequence[Cells] | None = None,
     space: Any = None,
     bcs: Any = (),
 ) -> SemiDiscreteSystem:
@@ -133,6 +135,10 @@ def assemble(
             a function, points (k, d) [m] ->
             components (k, 4) xx, yy, zz, xy or (k, 6) xx, yy, zz, xy, yz, xz [Pa], tension
             positive. Loads should hold it in equilibrium.
+        absent: cells of bodies that are not there, which a later stage adds or an earlier one has
+            removed (``fem.place``, docs/guide/lifts.md). Nodes of these alone are held. () of
+            bodies that are all there, in a run whose stages add and remove some: stresses of
+            linear materials are remembered then too.
         initial_displacement: constant or points (k, d) -> (k, d) (eqs. 10, 10a), or (cells, value)
             pairs for several bodies. Where cells meet, the later pair counts; cells without a pair
             start from zero.
@@ -170,8 +176,12 @@ def assemble(
             "quadrature_degree": quadrature_degree,
             "integration": integration,
             "initial_stress": initial_stress,
+            "absent": absent,
         },
     )
+    missing = find_absent(mesh, absent)
+    if missing is not None:
+        material = let_remember(material, forms)
 
     # what is given: kinds, groups, conditions that go together
     bcs = as_tuple(bcs)
@@ -209,9 +219,12 @@ def assemble(
     ]
     if bcs:
         supports += [values.support(nodes.owned) for values in read_values(mesh, V, bcs)]
+    if missing is not None:
+        supports.append(hold_absent(comm, V, nodes, missing).support(nodes.owned))
     space = FemSpace(
         V, nodes, supports, conditions.tied, degree=degree, quadrature_degree=quadrature_degree
     )
+    space.absent = missing
     if bcs:
         refuse_contradictions(space)
     rigid = np.column_stack([space.restrict(motion) for motion in space.translations])

@@ -64,7 +64,7 @@ def release(
     # where the body is, and that the problem begins there
     before, after = _spaces(static, problem)
     nodal = before.expand(static.cartesian(state.u), state.t)
-    added = _stand(before, after, nodal)
+    added = stand_on(before, after, nodal)
     u0 = after.restrict(nodal)
     still = np.zeros_like(u0)
     _, first = begin_from(problem, u0, still, state)
@@ -237,7 +237,7 @@ def find_removed_support(
     return max(candidates, key=lambda candidate: candidate[1])
 
 
-def _stand(before: FemSpace, after: FemSpace, nodal: Array) -> Mask:
+def stand_on(before: FemSpace, after: FemSpace, nodal: Array) -> Mask:
     """Let what ``after`` holds in addition stay where the body is (``after.stands``). Collective.
 
     Args:

@@ -132,6 +132,7 @@ class FemSpace(NodalSpace):
         unknowns: number of unknowns on all ranks.
         elimination: P of u_full = P u + U.
         forms: the ElasticForms of the system made on it; stress output needs them.
+        absent: which local cells are absent (``body.absent``); None where none ever are.
         stands: (k, d) where supports hold nodes that an earlier stage had moved [m], or None.
     """
 
@@ -208,6 +209,7 @@ class FemSpace(NodalSpace):
         )
         self.forms: Any = None
         self.stands: Array | None = None
+        self.absent: Mask | None = None
 
     @property
     def translations(self) -> list[Array]:

@@ -8,9 +8,10 @@ from collections.abc import Callable, Sequence
 from math import radians, sin
 from typing import Any
 
+import numpy as np
 import ufl
 
-from ...core.algebra import Array
+from ...core.algebra import Array, total
 from ...core.errors import InputError
 from ...core.internal import InternalForce
 from ...laws.drucker_prager import DruckerPrager
@@ -60,9 +61,11 @@ class YieldingForms(ElasticForms):
             InputError: what materials that yield do not go with.
         """
         refuse_beside(space, [given for _, given in materials], section)
+        materials = keep_present(space, materials)
         elastic = [(where, getattr(given, "elastic", given)) for where, given in materials]
         super().__init__(space, elastic, section, damping)
-        warn_of_locking(space, integration)
+        if any(type(given) is not YieldingMaterial for _, given in materials):
+            warn_of_locking(space, integration)
         self.integration = integration
         self._given = materials
         self._points = StrainPoints(
@@ -81,8 +84,9 @@ class YieldingForms(ElasticForms):
 
     @property
     def given_materials(self) -> list[tuple[Any, Any]]:
-        """Return (local cells, material) as they were given, with those that yield."""
-        return self._given
+        """Return (local cells, material) as they were given, of present cells. Collective."""
+        comm = self.space.comm
+        return [pair for pair in self._given if total(comm, float(len(pair[0]))) > 0.0]
 
     def matrix(self, name: str) -> Any:
         """Assemble the full matrix M, K, or C (PETSc), before elimination."""
@@ -142,6 +146,22 @@ def refuse_beside(space: FemSpace, materials: Sequence[Any], section: Section) -
                 f"{name} does not go with {type(given).__name__} in one body: give a LinearElastic "
                 "where nothing yields"
             )
+
+
+def keep_present(space: FemSpace, materials: list[tuple[Any, Any]]) -> list[tuple[Any, Any]]:
+    """Return the materials with their present cells; a material of none stays, with no cells.
+
+    Args:
+        space: the body's unknowns.
+        materials: pairs of local cells and a material.
+    """
+    if space.absent is None:
+        return materials
+    kept = []
+    for where, given in materials:
+        cells = np.asarray(where)
+        kept.append((cells[~space.absent[cells]], given))
+    return kept
 
 
 def warn_of_locking(space: FemSpace, integration: str) -> None:

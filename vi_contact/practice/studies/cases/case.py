@@ -527,7 +527,8 @@ class Case:
             system = self._build_table("gravity", system=system, tags=tags)
         no_surface = empty_surface(system.algebra.comm, system.space.dimension)
         contacts = self._build_tables("contact", system=system, tags=tags)
-        surfaces = contacts or (no_surface,)
+        # Contact of bodies that are absent has no conditions.
+        surfaces = tuple(one for one in contacts if one.total) or (no_surface,)
         surface = joined_surfaces(*surfaces) if len(surfaces) > 1 else surfaces[0]
 
         # Motions that rise through the base are no inertia load as well.

@@ -25,6 +25,7 @@ from ....core.own_files import inner_folder, is_own, make_inner_folder, read_tex
 from ....core.problem import ContactProblem
 from ....core.state_checks import initial_state
 from ....core.step import State
+from ....fem.body.placing import adds_or_removes, keep_gaps, place, same_bodies
 from ....fem.body.released_supports import (
     begin_from,
     find_internal_force,
@@ -297,6 +298,14 @@ def _enter(stage: Stage, reached: Reached, comm: Any) -> tuple[Reached, Parts, S
         return reached, parts, None
     problem: ContactProblem = stage.case.problem(comm, parts)
     try:
+        if not same_bodies(before, problem):
+            begun, first = place(before, state, problem)
+            begins = replace(parts, system=begun.system, surface=begun.surface, begins=first)
+            return replace(reached, force=0.0), begins, None
+        if adds_or_removes(problem):
+            surface = keep_gaps(before.surface, problem.surface, problem.system.u0)
+            parts = replace(parts, surface=surface)
+            problem = stage.case.problem(comm, parts)
         if same_supports(before, problem) and (stage.static or not reached.static):
             u, v = before.cartesian(state.u), before.cartesian(state.v)
             begun, first = begin_from(

@@ -55,7 +55,7 @@ def describe_meshed_body(problem: ContactProblem, tags: Mapping[str, Any]) -> di
         "mass": sum(body["mass"] for body in bodies),
         "bodies": bodies,
         "supports": list(describe_supports(space)),
-        "outline": outline(space, tags, [cells for cells, _ in space.forms.materials]),
+        "outline": outline(space, tags, [cells for cells, _ in space.forms.given_materials]),
     }
 
 
