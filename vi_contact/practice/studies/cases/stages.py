@@ -265,7 +265,9 @@ def _run_stage(
             arguments["state"] = None  # the checkpoint has it
         solution = simulate(**arguments)
     earlier = reached.earlier
-    if reached.problem is not None:
+    if stage.changes:  # it is in equilibrium on its own supports alone
+        earlier = ()
+    elif reached.problem is not None:
         earlier = (*earlier, reached.problem)
     after = replace(
         reached,

@@ -12,6 +12,7 @@ from .....core.problem import ContactProblem
 from .....core.step import AXES
 from .....fem.mesh.tagged_mesh import Facets
 from .....fem.output.outline import facets_with_cells
+from .....fem.body.absent import NAME as ABSENT
 from ..bodies import Body
 from ..friction_of_tables import count_points, find_mu
 from ..table_calls import Group, build, walk_nodes
@@ -25,6 +26,8 @@ def describe_supports(space: Any) -> Iterator[dict[str, Any]]:
     Ties of sides to each other are among it.
     """
     for support in space.prescribed:
+        if support.name == ABSENT:  # bodies that are not there are no support
+            continue
         kind = "fixed" if support.components is None else "roller, fixed"
         if support.moves:
             kind = "moved"
