@@ -23,11 +23,27 @@ from ..mesh.group_checks import cells_of
 from ..mesh.numbering import NodeTable
 from ..mesh.tagged_mesh import Cells, local_count
 from .dirichlet import GivenValues
+from .loads import Support
 
 NAME = "absent bodies"
 
 
-def find_absent(mesh: Any, absent: Any) -> Mask | None:
+def leave_out(mesh: Any, material: Any, absent: Any, forms: Any) -> tuple[Any, Mask | None]:
+    """Return the materials of a body, and which local cells are absent. Collective.
+
+    Both are as given, and None, where nobody asks.
+
+    Args:
+        mesh: of the body.
+        material: one, or (cells, material) pairs.
+        absent: cell groups, one of them, or None.
+        forms: the user's own, or None.
+    """
+    missing = _find_absent(mesh, absent)
+    return (material if missing is None else _let_remember(material, forms)), missing
+
+
+def _find_absent(mesh: Any, absent: Any) -> Mask | None:
     """Return which local cells, ghosts among them, are absent; None where nobody asks. Collective.
 
     Args:
@@ -48,7 +64,7 @@ def find_absent(mesh: Any, absent: Any) -> Mask | None:
     return missing
 
 
-def let_remember(material: Any, forms: Any) -> Any:
+def _let_remember(material: Any, forms: Any) -> Any:
     """Return materials of which the linear ones remember their stress.
 
     Args:
@@ -64,7 +80,7 @@ def let_remember(material: Any, forms: Any) -> Any:
             "material= in the place of forms="
         )
     if isinstance(material, Sequence):
-        return [(cells, let_remember(own, None)) for cells, own in material]
+        return [(cells, _let_remember(own, None)) for cells, own in material]
     if isinstance(material, LinearElastic):
         return YieldingMaterial(material.E, material.nu, material.rho, xi=material.xi)
     if material is not None and not isinstance(material, YieldingMaterial):
@@ -75,17 +91,19 @@ def let_remember(material: Any, forms: Any) -> Any:
     return material
 
 
-def hold_absent(comm: MpiComm, V: Any, nodes: NodeTable, missing: Mask) -> GivenValues:
-    """Return the support of the nodes that no present cell has. Collective.
+def hold_absent(comm: MpiComm, V: Any, nodes: NodeTable, missing: Mask | None) -> list[Support]:
+    """Return the support of the nodes that no present cell has; none where nobody asks. Collective.
 
     Args:
         comm: the ranks.
         V: the displacement's space.
         nodes: its nodes.
-        missing: which local cells are absent.
+        missing: which local cells are absent, or None.
     """
+    if missing is None:
+        return []
     blocks = np.unique(compat.cell_blocks(V)[~missing])
     present = np.unique(np.concatenate(from_each(comm, nodes.numbers[blocks])))
     alone = ~np.isin(nodes.numbers, present)
     mask = np.repeat(alone[:, None], V.mesh.geometry.dim, axis=1)
-    return GivenValues(NAME, mask, np.zeros(mask.shape), False)
+    return [GivenValues(NAME, mask, np.zeros(mask.shape), False).support(nodes.owned)]

@@ -41,7 +41,7 @@ from ..matrices.petsc_rows import transfer
 from ..mesh.communicators import MpiComm, give_back
 from ..mesh.numbering import number_nodes
 from ..mesh.tagged_mesh import Cells, Facets
-from .absent import find_absent, hold_absent, let_remember
+from .absent import hold_absent, leave_out
 from .assembly_checks import (
     check_body,
     check_initial,
@@ -179,9 +179,7 @@ def assemble(
             "absent": absent,
         },
     )
-    missing = find_absent(mesh, absent)
-    if missing is not None:
-        material = let_remember(material, forms)
+    material, missing = leave_out(mesh, material, absent, forms)
 
     # what is given: kinds, groups, conditions that go together
     bcs = as_tuple(bcs)
@@ -219,12 +217,16 @@ def assemble(
     ]
     if bcs:
         supports += [values.support(nodes.owned) for values in read_values(mesh, V, bcs)]
-    if missing is not None:
-        supports.append(hold_absent(comm, V, nodes, missing).support(nodes.owned))
+    supports += hold_absent(comm, V, nodes, missing)
     space = FemSpace(
-        V, nodes, supports, conditions.tied, degree=degree, quadrature_degree=quadrature_degree
+        V,
+        nodes,
+        supports,
+        conditions.tied,
+        degree=degree,
+        quadrature_degree=quadrature_degree,
+        absent=missing,
     )
-    space.absent = missing
     if bcs:
         refuse_contradictions(space)
     rigid = np.column_stack([space.restrict(motion) for motion in space.translations])

@@ -145,6 +145,7 @@ class FemSpace(NodalSpace):
         *,
         degree: int = 1,
         quadrature_degree: int | None = None,
+        absent: Mask | None = None,
     ) -> None:
         """Give numbers to the unknowns. Collective.
 
@@ -155,6 +156,7 @@ class FemSpace(NodalSpace):
             tied: boundaries that move together.
             degree: that of V, 1 or 2.
             quadrature_degree: that of all forms, None for UFL's estimate.
+            absent: which local cells are absent; None where none ever are.
         """
         self.V = V
         self.mesh = V.mesh
@@ -209,7 +211,7 @@ class FemSpace(NodalSpace):
         )
         self.forms: Any = None
         self.stands: Array | None = None
-        self.absent: Mask | None = None
+        self.absent = absent
 
     @property
     def translations(self) -> list[Array]:

@@ -267,11 +267,15 @@ class YieldingForce:
 
     def _reach(self, u: Array) -> Reached:
         """Return what the points know at a displacement. Collective."""
-        for known in self._known:
-            if np.array_equal(known.u, u):
+        # Ranks decide together: one may have no unknowns, or none that have changed.
+        places = [*(known.u for known in self._known), self._u]
+        own = [not np.array_equal(place, u) for place in places]
+        *differs, moved = self._space.comm.max(np.array(own, dtype=float)) > 0.0
+        for known, other in zip(self._known, differs, strict=True):
+            if not other:
                 return known
         way = self._points.strain(u) - self._strain
-        if np.array_equal(self._u, u):  # where it stands nothing flows, not by rounding either
+        if not moved:  # where it stands nothing flows, not by rounding either
             states = list(self._states)
         else:
             states = on_all(self._space.comm, "a material that yields", lambda: self._follow(way))

@@ -8,7 +8,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ...core.algebra import Array, Mask, from_each, total
-from ...core.errors import InputError
 from .. import compat
 from ..body.space import FemSpace
 from ..mesh.tagged_mesh import Facets
@@ -37,14 +36,7 @@ def keep_present(
     if len(middles) and len(facets1.indices):
         nearest = cKDTree(middles).query(_find_middles(space, facets1))[1]
         there1 = there1 & flags[nearest]
-    sides = _pick(facets1, there1), _pick(facets2, there2)
-    count = [total(space.comm, len(side.indices)) for side in sides]
-    if (count[0] > 0.0) != (count[1] > 0.0):
-        raise InputError(
-            f"contact between '{facets1.name}' and '{facets2.name}': of one side nothing is "
-            "present that faces the other: give sides that face one another"
-        )
-    return sides
+    return _pick(facets1, there1), _pick(facets2, there2)
 
 
 def is_there(space: FemSpace, facets: Facets) -> bool:

@@ -158,7 +158,6 @@ def contact_surface(
     directions = directions[order]
     gap = gap[order]
     slots = slots_of(comm, _places(nodes, chosen))
-    weights = nodes.weights * space.forms.section.thickness
     tell_corners(space, facets.name, nodes, slots, angle)
     # nodes of the boundary without a condition borrow a pressure, unless points are listed
     without = every.numbers if chosen is None else every.numbers[:0]
@@ -174,16 +173,21 @@ def contact_surface(
     kinds |= {
         "not listed": ~(held | wanted),
         "tied to another": wanted & ~np.isin(every.numbers, nodes.numbers),
+        "shared with another body": hinge,
     }
     watched: tuple[Watched, ...] = ()
     if chosen is None and not body_turns:
         lost, _ = split_at_corners(space, around, every.pick(held), angle)
         watched = _watch_held(space, facets.name, lost, obstacle)
-    kinds["shared with another body"] = hinge
     census = census_on_ranks(comm, facets.name, every, kinds, len(slots))
     tell(comm, census)
     surface = surface_of(
-        space, [conditions], gap0=gap, weights=weights, censuses=(census,), watched=watched
+        space,
+        [conditions],
+        gap0=gap,
+        weights=nodes.weights * space.forms.section.thickness,
+        censuses=(census,),
+        watched=watched,
     )
     return replace(surface, **make_prescribed_motion(space, conditions, surface))
 

@@ -302,8 +302,8 @@ def _enter(stage: Stage, reached: Reached, comm: Any) -> tuple[Reached, Parts, S
     try:
         if not same_bodies(before, problem):
             begun, first = place(before, state, problem)
-            begins = replace(parts, system=begun.system, surface=begun.surface, begins=first)
-            return replace(reached, force=0.0), begins, None
+            placed = replace(parts, system=begun.system, surface=begun.surface, begins=first)
+            return replace(reached, force=0.0), placed, None
         if adds_or_removes(problem):
             surface = keep_gaps(before.surface, problem.surface, problem.system.u0)
             parts = replace(parts, surface=surface)

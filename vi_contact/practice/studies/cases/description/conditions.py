@@ -10,9 +10,9 @@ import numpy as np
 from .....core.algebra import Array, largest
 from .....core.problem import ContactProblem
 from .....core.step import AXES
+from .....fem.body.absent import NAME as ABSENT
 from .....fem.mesh.tagged_mesh import Facets
 from .....fem.output.outline import facets_with_cells
-from .....fem.body.absent import NAME as ABSENT
 from ..bodies import Body
 from ..friction_of_tables import count_points, find_mu
 from ..table_calls import Group, build, walk_nodes
