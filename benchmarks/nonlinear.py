@@ -37,8 +37,6 @@ import argparse
 import json
 import os
 import sys
-import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -50,6 +48,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np  # noqa: E402
 from load_steps import COMM  # noqa: E402
 from load_steps import block as pose_for_vi  # noqa: E402
+from marching import march, spend  # noqa: E402
 
 import vi_contact as vc  # noqa: E402
 from demos.parts.problems.nonlinear import (  # noqa: E402
@@ -70,27 +69,9 @@ BARREL_STEP = 0.1  # m
 BARREL_STAGES = 3
 
 
-def spend(call: Callable[[], Any]) -> tuple[float, Any]:
-    """Return the processor time of a call on the busiest rank [s], and what it returns."""
-    start = time.process_time()
-    answer = call()
-    return max(COMM.allgather(time.process_time() - start)), answer
-
-
 def make_linear(problem: vc.ContactProblem) -> vc.ContactProblem:
     """Return the problem of the body that has the reference stiffness alone."""
     return replace(problem, system=problem.system.changed(internal=None))
-
-
-def march(problem: vc.ContactProblem, dt: float, steps: int) -> tuple[vc.Stepper, list[Any]]:
-    """Return the stepper after so many steps of dt [s], and their reports."""
-    stepper = vc.Stepper(problem, scheme=vc.Midpoint(), solver=vc.Condensed())
-    reports = []
-    for _ in range(steps):
-        trial = stepper.attempt(dt)
-        stepper.accept(trial)
-        reports.append(trial.report)
-    return stepper, reports
 
 
 def measure_march(problem: vc.ContactProblem, dt: float, steps: int) -> Numbers:
@@ -101,8 +82,8 @@ def measure_march(problem: vc.ContactProblem, dt: float, steps: int) -> Numbers:
         dt: length of a step [s].
         steps: number of steps.
     """
-    seconds, (stepper, reports) = spend(lambda: march(problem, dt, steps))
-    plain, _ = spend(lambda: march(make_linear(problem), dt, steps))
+    seconds, (stepper, reports) = spend(lambda: march(problem, vc.Midpoint(), dt, steps))
+    plain, _ = spend(lambda: march(make_linear(problem), vc.Midpoint(), dt, steps))
 
     # The ledger is kept afterwards, so that it is not in the time.
     ledger = vc.Energy()
@@ -139,7 +120,10 @@ def measure_block(n: int, steps: int) -> Numbers:
     """
     problem = throw_block(COMM, n, friction=vc.Coulomb(0.3), mass=vc.ConsistentMass())
     dt = 1.0 / (STRAINS * Rubber().shear_speed)
-    return {"unknowns": problem.system.space.unknowns, **measure_march(problem, dt, steps)}
+    return {
+        "unknowns": problem.system.space.unknowns,
+        **measure_march(problem, dt, steps),
+    }
 
 
 def solve_stages(problem: vc.ContactProblem, times: list[float]) -> tuple[Equilibria, list[Any]]:

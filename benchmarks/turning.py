@@ -27,8 +27,6 @@ import argparse
 import json
 import os
 import sys
-import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -38,35 +36,16 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np  # noqa: E402
-from mpi4py import MPI  # noqa: E402
+from marching import COMM, march, spend  # noqa: E402
 
 import vi_contact as vc  # noqa: E402
 from demos.parts.problems import turning  # noqa: E402
 from vi_contact.core.ledger import energy_balance  # noqa: E402
 
-COMM = MPI.COMM_WORLD
 Numbers = dict[str, float]
 PER_TURN = 20
 PER_QUARTER = 50
 ANGLE = 0.3  # rad
-
-
-def spend(call: Callable[[], Any]) -> tuple[float, Any]:
-    """Return the processor time of a call on the busiest rank [s], and what it returns."""
-    start = time.process_time()
-    answer = call()
-    return max(COMM.allgather(time.process_time() - start)), answer
-
-
-def march(problem: vc.ContactProblem, dt: float, steps: int) -> tuple[vc.Stepper, list[Any]]:
-    """Return the stepper after so many steps of dt [s], and their reports."""
-    stepper = vc.Stepper(problem, scheme=vc.EnergyMomentum(), solver=vc.Condensed())
-    reports = []
-    for _ in range(steps):
-        trial = stepper.attempt(dt)
-        stepper.accept(trial)
-        reports.append(trial.report)
-    return stepper, reports
 
 
 def measure(problem: vc.ContactProblem, dt: float, steps: int) -> tuple[Numbers, list[Any]]:
@@ -77,9 +56,9 @@ def measure(problem: vc.ContactProblem, dt: float, steps: int) -> tuple[Numbers,
         dt: length of a step [s].
         steps: number of steps.
     """
-    seconds, (stepper, reports) = spend(lambda: march(problem, dt, steps))
+    seconds, (stepper, reports) = spend(lambda: march(problem, vc.EnergyMomentum(), dt, steps))
     linear = replace(problem, system=problem.system.changed(internal=None))
-    plain, _ = spend(lambda: march(linear, dt, steps))
+    plain, _ = spend(lambda: march(linear, vc.EnergyMomentum(), dt, steps))
     numbers = {
         "unknowns": problem.system.space.unknowns,
         "linear_steps_mean": float(np.mean([report.result.iterations for report in reports])),

@@ -111,3 +111,10 @@ def test_the_energy_of_no_joint_is_not_recorded() -> None:
 def test_a_problem_says_which_law_its_joint_has() -> None:
     problem = block(laws.Joint(mu=0.6), lift=-1e4)
     assert "joint: Joint(mu=0.6" in repr(problem) and "Frictionless" not in repr(problem)
+
+
+@pytest.mark.parametrize("solver", [vc.Volume(), vc.Iterative()], ids=["volume", "iterative"])
+def test_solvers_without_contact_unknowns_refuse_slip_rates_before_any_work(solver: Any) -> None:
+    problem = block(laws.RateAndState(a=0.01, b=0.015, mu0=0.6, V0=1e-6, dc=1e-4), lift=0.0)
+    with pytest.raises(InputError, match=r"cannot use RateAndState.*use Condensed\(\)"):
+        vc.Stepper(problem, scheme=vc.Midpoint(), solver=solver)

@@ -7,11 +7,12 @@ storage. It may announce an array that no memory holds. Nothing of this is follo
 
 import os
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from .errors import InputError
+from .errors import InputError, is_of_machine
 from .own_files import open_to_read
 
 DENSEST = 1100  # bytes in memory for one on disk: zeros that are packed
@@ -122,3 +123,38 @@ class StoredFile(StoredGroup):
         trace: TracebackType | None,
     ) -> None:
         self.close()
+
+
+@contextmanager
+def refuse_damage(path: Path, remedy: str) -> Iterator[StoredFile]:
+    """Open a file of a run, and say in one sentence when it is missing or damaged.
+
+    What goes wrong while it is read counts as damage: an array that is missing, of another shape
+    or of another kind. Errors of the machine, such as a full memory, are raised as they are.
+
+    Args:
+        path: the file.
+        remedy: what the user can do, the end of the sentence.
+
+    Raises:
+        InputError: names the file and the remedy.
+    """
+    try:
+        with StoredFile(path) as file:
+            yield file
+    except InputError:
+        raise
+    except (
+        OSError,
+        KeyError,
+        ValueError,
+        IndexError,
+        TypeError,
+        AttributeError,
+        RuntimeError,
+        ZeroDivisionError,
+    ) as error:
+        if is_of_machine(error):
+            raise
+        reason = " ".join(str(error).split())[:200]
+        raise InputError(f"'{path}' is missing or damaged ({reason}): {remedy}") from error

@@ -87,6 +87,7 @@ class JointStep:
         s0: slips (m, d - 1) [m] at the beginning.
         raised: how far slip has lifted the points (m,) [m].
         lifted: by how much of it in this step (m,) [m].
+        prestress: forces [N] that the joint had before: normal (m,), tangential (m, d - 1).
         dt: length of the step [s], 0 for a static stage.
         at_end: whether the strength is that at the end, and not the mean.
         used: the strength in newtons that the step is solved with; None before the first pass.
@@ -100,6 +101,7 @@ class JointStep:
     s0: Array
     raised: Array
     lifted: Array
+    prestress: tuple[Array, Array]
     dt: float
     at_end: bool
     used: Strength | None = None
@@ -182,20 +184,6 @@ class JointStep:
         there = law.commit(self.committed, self.g0, g1, self.s0, s1, self.dt)
         slope = law.slope(there, g1, g1, s1, s1, self.dt)
         return Slope(2.0 * weights * slope.tension, 2.0 * np.asarray(slope.mu, dtype=float))
-
-    @property
-    def prestress(self) -> tuple[Array, Array]:
-        """Return the forces [N] that the joint had before: normal (m,), tangential (m, d - 1)."""
-        normal = np.zeros(self.surface.count)
-        shear = np.zeros(self.s0.shape)
-        before = getattr(self.law, "prestress", None)
-        if before is not None:
-            count = self.surface.count
-            weights = self.surface.weights
-            normal = weights * before.spread("normal", count)
-            if shear.shape[1]:
-                shear[:, 0] = weights * before.spread("shear", count)
-        return normal, shear
 
     @property
     def pull(self) -> Array:
@@ -424,6 +412,18 @@ def find_limit(problem: ContactProblem, state: State) -> Array:
     return np.asarray(cohesion + left.mu * np.maximum(effective, 0.0))
 
 
+def _weigh_prestress(law: Any, surface: ContactSurface, slip: Array) -> tuple[Array, Array]:
+    """Return the forces [N] of a law's prestress: normal (m,), tangential (m, d - 1) as slips."""
+    normal = np.zeros(surface.count)
+    shear = np.zeros(slip.shape)
+    before = getattr(law, "prestress", None)
+    if before is not None:
+        normal = surface.weights * before.spread("normal", surface.count)
+        if shear.shape[1]:
+            shear[:, 0] = surface.weights * before.spread("shear", surface.count)
+    return normal, shear
+
+
 def pose_joint(
     problem: ContactProblem, state: State, dt: float, *, at_end: bool = False
 ) -> JointStep:
@@ -446,14 +446,16 @@ def pose_joint(
     gap = surface.gap(state.t) - surface.normal_values(state.u) - before
     gap = gap + surface.compliance * state.r_n
     g0 = np.where(state.active, 0.0, np.maximum(gap, 0.0))
+    s0 = surface.slip(state.u, state.t)
     return JointStep(
         law=law,
         committed={name: values for name, values in committed.items() if name != RAISED},
         surface=surface,
         g0=g0,
-        s0=surface.slip(state.u, state.t),
+        s0=s0,
         raised=raised,
         lifted=raised - before,
+        prestress=_weigh_prestress(law, surface, s0),
         dt=dt,
         at_end=at_end,
     )

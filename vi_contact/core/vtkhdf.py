@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from .algebra import Array, Indices
-from .errors import InputError, is_of_machine
-from .files import hdf5_atomically, open_hdf5
+from .files import hdf5_atomically
+from .hdf5 import refuse_damage
 from .hdf5_changes import change_hdf5
 from .own_files import is_own
 
@@ -274,14 +274,20 @@ class StoredSeries:
         arrays: dict[str, dict[str, Array]] = {POINT_DATA: {}, CELL_DATA: {}}
         for name, group in self._place.items():
             arrays[group][name] = self.read(name, frame)
-        k, t = int(self.steps[frame]), float(self.times[frame])
-        return Frame(k, t, arrays[POINT_DATA], arrays[CELL_DATA])
+        return Frame(
+            k=int(self.steps[frame]),
+            t=float(self.times[frame]),
+            nodal=arrays[POINT_DATA],
+            cellwise=arrays[CELL_DATA],
+        )
 
     def read_pieces(self) -> Pieces:
         """Return the grid."""
         root = self._root
-        cells, numbers = [], []
-        point, row = 0, 0
+        cells = []
+        numbers = []
+        point = 0
+        row = 0
         corners = int(root["NumberOfConnectivityIds"][0] // root["NumberOfCells"][0])
         connectivity = root["Connectivity"][()].reshape(-1, corners)
         counts = zip(root["NumberOfPoints"][()], root["NumberOfCells"][()], strict=True)
@@ -305,27 +311,8 @@ class StoredSeries:
 @contextmanager
 def open_series(path: Path) -> Iterator[StoredSeries]:
     """Open the file to be read; InputError when it is missing or damaged."""
-    try:
-        with open_hdf5(path) as file:
-            yield StoredSeries(file)
-    except InputError:
-        raise
-    except (
-        OSError,
-        KeyError,
-        ValueError,
-        IndexError,
-        TypeError,
-        AttributeError,
-        RuntimeError,
-        ZeroDivisionError,
-    ) as error:
-        if is_of_machine(error):
-            raise
-        reason = " ".join(str(error).split())[:200]
-        raise InputError(
-            f"'{path}' is missing or damaged ({reason}): restore it, or run again"
-        ) from error
+    with refuse_damage(path, "restore it, or run again") as file:
+        yield StoredSeries(file)
 
 
 def list_steps(folder: Path) -> list[int]:

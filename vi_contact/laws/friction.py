@@ -45,7 +45,7 @@ class Tresca:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        object.__setattr__(self, "threshold", _as_tuple("Tresca", self.threshold))
+        object.__setattr__(self, "threshold", keep_as_tuple("Tresca", self.threshold))
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
         """Return threshold · weights · scale, shape (m,).
@@ -55,7 +55,7 @@ class Tresca:
             weights: nodal weights (m,), areas in space.
             scale: factor from forces to reactions, 1 or the time step [s].
         """
-        threshold = _spread("Tresca", "threshold", self.threshold, len(weights))
+        threshold = spread_values("Tresca", "threshold", self.threshold, len(weights))
         return threshold * np.asarray(weights, dtype=float) * scale
 
     def slope(self, weights: Array) -> Array:
@@ -82,7 +82,7 @@ class Coulomb:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        object.__setattr__(self, "mu", _as_tuple("Coulomb", self.mu))
+        object.__setattr__(self, "mu", keep_as_tuple("Coulomb", self.mu))
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
         """Return mu · max(r_n, 0), shape (m,).
@@ -94,11 +94,11 @@ class Coulomb:
             weights: nodal weights (m,), areas in space.
             scale: factor from forces to reactions, 1 or the time step [s].
         """
-        return _spread("Coulomb", "mu", self.mu, len(r_n)) * np.maximum(r_n, 0.0)
+        return spread_values("Coulomb", "mu", self.mu, len(r_n)) * np.maximum(r_n, 0.0)
 
     def slope(self, weights: Array) -> Array:
         """Return mu, shape (m,)."""
-        return _spread("Coulomb", "mu", self.mu, len(weights)) * np.ones(len(weights))
+        return spread_values("Coulomb", "mu", self.mu, len(weights)) * np.ones(len(weights))
 
     def at(self, speed: Array) -> "Coulomb":
         """Return itself: the law does not know the slip rate."""
@@ -171,7 +171,7 @@ class TwoCoefficients:
     def __post_init__(self) -> None:
         check_fields(self)
         for name in ("mu_s", "mu_k"):
-            object.__setattr__(self, name, _as_tuple(type(self).__name__, getattr(self, name)))
+            object.__setattr__(self, name, keep_as_tuple(type(self).__name__, getattr(self, name)))
         static = self.mu_s
         kinetic = self.mu_k
         if not isinstance(static, tuple) or not isinstance(kinetic, tuple):
@@ -184,8 +184,8 @@ class TwoCoefficients:
     def _coefficients(self, count: int) -> tuple[Array, Array]:
         """Return mu_s and mu_k as arrays that broadcast over ``count`` nodes."""
         owner = type(self).__name__
-        static = _spread(owner, "mu_s", self.mu_s, count)
-        kinetic = _spread(owner, "mu_k", self.mu_k, count)
+        static = spread_values(owner, "mu_s", self.mu_s, count)
+        kinetic = spread_values(owner, "mu_k", self.mu_k, count)
         return static, kinetic
 
 
@@ -260,7 +260,7 @@ def project(r_t: Array, limit: Array) -> Array:
     return r_t * factor[:, np.newaxis]
 
 
-def _as_tuple(law: str, value: Any) -> Any:
+def keep_as_tuple(law: str, value: Any) -> Any:
     """Return one value as it is, and values per point as a tuple, which laws can be compared by."""
     if np.ndim(value) > 1:
         raise InputError(f"{law}: the values have shape {np.shape(value)}; {ONE_EACH}")
@@ -268,7 +268,7 @@ def _as_tuple(law: str, value: Any) -> Any:
     return tuple(map(float, value)) if per_point else value
 
 
-def _spread(law: str, name: str, value: Any, count: int) -> Array:
+def spread_values(law: str, name: str, value: Any, count: int) -> Array:
     """Return the value as an array that broadcasts over ``count`` nodes.
 
     Args:

@@ -32,6 +32,7 @@ from .joint_values import (
     Prestress,
     compare_fields,
     measure_length,
+    take_mean_of_line,
 )
 
 SHORT = 1e-6  # of dc: over a shorter way the slope of the mean is half that of the law
@@ -154,14 +155,12 @@ class Joint(OfPoints):
         """Return the mean of D between two kappa (m,) [m], first <= last."""
         if self.softening == "brittle":
             return self._left(last, dc)
-        a = np.minimum(first, dc)
-        b = np.minimum(last, dc)
         way = last - first
-        # Beyond dc nothing is left, and between them the mean is that of the part below.
-        part = np.divide(b - a, way, out=np.ones(len(a)), where=way > 0.0)
         if self.softening == "linear":
-            return (1.0 - 0.5 * (a + b) / dc) * part
-        return np.where(way > 0.0, part, self._left(first, dc))
+            return take_mean_of_line(first, way, dc)
+        # Of constant strength the mean is the part of the way that lies below dc.
+        below = np.minimum(last, dc) - np.minimum(first, dc)
+        return np.divide(below, way, out=self._left(first, dc), where=way > 0.0)
 
     def _walk(
         self, committed: Committed, g1: Array, s1: Array

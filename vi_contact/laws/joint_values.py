@@ -12,7 +12,7 @@ from ..core.arguments import check_fields
 from ..core.checks import quote
 from ..core.errors import InputError
 from ..core.quantities import Between, Finite, Unit
-from .friction import _as_tuple, _spread
+from .friction import keep_as_tuple, spread_values
 
 OF_POINTS = "give zero or a positive finite number, one per point, or a function of the points"
 ABOVE_ZERO = "give a positive finite number, one per point, or a function of the points"
@@ -32,7 +32,7 @@ class OfPoints:
         for field in fields(self):  # type: ignore[arg-type]
             value = getattr(self, field.name)
             if isinstance(value, tuple | list | np.ndarray):
-                object.__setattr__(self, field.name, _as_tuple(owner, value))
+                object.__setattr__(self, field.name, keep_as_tuple(owner, value))
 
     def at_points(self, points: Array) -> Any:
         """Return the law with its functions taken at points (m, d) [m].
@@ -68,7 +68,7 @@ class OfPoints:
         """
 
         def read() -> Array:
-            value = _spread(type(self).__name__, name, getattr(self, name), count)
+            value = spread_values(type(self).__name__, name, getattr(self, name), count)
             return np.full(count, value)
 
         return self.make_once(name, count, read)
@@ -104,6 +104,23 @@ class OfPoints:
 def measure_length(s: Array) -> Array:
     """Return the lengths (m,) of tangential vectors (m, d - 1)."""
     return np.asarray(np.abs(s[:, 0]) if s.shape[1] == 1 else np.linalg.norm(s, axis=1))
+
+
+def take_mean_of_line(first: Array, way: Array, reach: Array) -> Array:
+    """Return the mean (m,) of 1 - min(S/reach, 1) while S grows by a way.
+
+    The line is integrated up to the reach; beyond it nothing is left. Without a way it is the
+    value itself.
+
+    Args:
+        first: S (m,) [m] at the beginning.
+        way: by how much it grows (m,) [m], >= 0.
+        reach: where nothing is left any more (m,) [m].
+    """
+    begin = np.minimum(first, reach)
+    end = np.minimum(first + way, reach)
+    below = np.divide(end - begin, way, out=np.ones(len(way)), where=way > 0.0)
+    return np.asarray((1.0 - 0.5 * (begin + end) / reach) * np.minimum(below, 1.0))
 
 
 def compare_fields(check: Callable[..., Any], *values: Any) -> Any:

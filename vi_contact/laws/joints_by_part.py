@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -83,7 +84,7 @@ class JointsByPart:
         """Say whether the strength of a step is that of its answer."""
         return all(getattr(law, "implicit", True) for law in self.laws.values())
 
-    @property
+    @cached_property
     def prestress(self) -> Prestress | None:
         """Return the prestress of all parts, zero where a part has none."""
         parts = [(getattr(law, "prestress", None), places) for law, places in self._bound]

@@ -22,6 +22,7 @@ from .joint_values import (
     Prestress,
     compare_fields,
     measure_length,
+    take_mean_of_line,
 )
 
 SHORT = 1e-6  # of the distance: over a shorter way the slope of the mean is half that of the law
@@ -83,14 +84,7 @@ class SlipWeakening(OfPoints):
         """
         count = len(s1)
         kinetic, drop, distance = self._read(count)
-        first = committed["way"]
-        way = measure_length(s1 - s0)
-
-        # The mean of 1 - S/dc over the part of the way below dc; beyond it nothing is left.
-        a = np.minimum(first, distance)
-        b = np.minimum(first + way, distance)
-        below = np.divide(b - a, way, out=np.ones(count), where=way > 0.0)
-        left = (1.0 - 0.5 * (a + b) / distance) * np.minimum(below, 1.0)
+        left = take_mean_of_line(committed["way"], measure_length(s1 - s0), distance)
         none = np.zeros(count)
         return Strength(none, self.spread("cohesion", count), kinetic + drop * left, none)
 

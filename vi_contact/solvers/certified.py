@@ -138,6 +138,20 @@ def refuse_traces(owner: str, surface: ContactSurface) -> None:
         )
 
 
+def refuse_rates(owner: str, problem: ContactProblem) -> None:
+    """Raise InputError for a joint of slip rates, where a solver has no contact unknowns alone.
+
+    Args:
+        owner: the solver, as messages name it.
+        problem: the contact problem.
+    """
+    if hasattr(problem.joint, "at_speed"):
+        raise InputError(
+            f"{owner} cannot use {type(problem.joint).__name__}, which is solved for the slip rate "
+            "on the contact unknowns: use Condensed()"
+        )
+
+
 def check_laws(owner: str, problem: ContactProblem, *, unsymmetric: bool = False) -> None:
     """Raise InputError for laws and matrices that do not suit a solver. Collective.
 

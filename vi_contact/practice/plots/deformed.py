@@ -4,12 +4,10 @@ A run in the plane or in space that writes fields (``fields=fem.XDMF(every=...)`
 ``Contact()`` leaves all that is needed there.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -17,8 +15,9 @@ from scipy.spatial import cKDTree
 from ...core.algebra import Array, Indices, Mask
 from ...core.arguments import check_arguments
 from ...core.checks import array
-from ...core.errors import InputError, is_of_machine
-from ...core.files import FIELDS, list_frames, open_hdf5
+from ...core.errors import InputError
+from ...core.files import FIELDS, list_frames
+from ...core.hdf5 import refuse_damage
 from ...core.vtkhdf import FIELDS_VTKHDF, StoredSeries, list_steps
 from ...meshes.rows import SIDES, number_parts
 from ...run.files.reading import RunFolder, read_run
@@ -30,6 +29,7 @@ STICK = 2
 SLIP = 3
 # What lies at one place or in one plane may differ by this, over the size of what is drawn.
 SAME = 1e-6
+DAMAGED = "restore it, or draw without fields"
 FACING = 0.5  # least cosine between the contact direction of a node and the normals of its facets
 # (dimension, corners) -> kind of cell.
 CELLS = {(2, 3): "triangle", (2, 4): "quadrilateral", (3, 4): "tetrahedron", (3, 8): "hexahedron"}
@@ -61,7 +61,7 @@ class StoredFrames:
         (row,) = find_nearest(self.t, [t])
         path, place = self.places[row]
         unknown = np.full(len(self.cells), np.nan)
-        with _open_fields(path) as file:
+        with refuse_damage(path, DAMAGED) as file:
             if isinstance(place, int):
                 series = StoredSeries(file)
                 u = series.read("u", place)
@@ -257,7 +257,7 @@ def _read_mesh(path: Path) -> tuple[Array, Indices]:
 
     path: of the mesh of XDMF, or of the file of VTKHDF.
     """
-    with _open_fields(path) as file:
+    with refuse_damage(path, DAMAGED) as file:
         if path.name == FIELDS_VTKHDF:
             series = StoredSeries(file)
             points = series.points
@@ -282,28 +282,3 @@ def _read_mesh(path: Path) -> tuple[Array, Indices]:
     vertices = VERTICES.get(cells.shape[1], cells.shape[1])
     d = 3 if np.any(points[:, 2]) else 2  # a mesh of the plane is stored with z = 0
     return points[:, :d], cells[:, :vertices]
-
-
-@contextmanager
-def _open_fields(path: Path) -> Iterator[Any]:
-    """Open a file of fields; InputError when it is missing or damaged."""
-    try:
-        with open_hdf5(path) as file:
-            yield file
-    except InputError:
-        raise
-    except (
-        OSError,
-        KeyError,
-        ValueError,
-        IndexError,
-        TypeError,
-        AttributeError,
-        RuntimeError,
-    ) as error:
-        if is_of_machine(error):
-            raise
-        reason = " ".join(str(error).split())[:200]
-        raise InputError(
-            f"'{path}' is missing or damaged ({reason}): restore it, or draw without fields"
-        ) from error

@@ -24,7 +24,7 @@ from ...core.problem import ContactProblem
 from ...core.quantities import Between, NotNegative, Positive
 from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
-from ..certified import check_laws, refuse_traces
+from ..certified import check_laws, refuse_rates, refuse_traces
 from ..petsc import PETSc
 from ..volume.failures import make_petsc_failure
 from ..volume.options import OptionLayers
@@ -96,6 +96,7 @@ class Iterative:
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError for friction without a tangential direction, or of a wrong length."""
         refuse_traces("Iterative()", problem.surface)
+        refuse_rates("Iterative()", problem)
         check_laws("Iterative()", problem)
 
     def prepare(

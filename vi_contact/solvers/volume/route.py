@@ -23,7 +23,7 @@ from ...core.errors import InputError, StepFailure
 from ...core.problem import ContactProblem
 from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
-from ..certified import check_laws, refuse_traces
+from ..certified import check_laws, refuse_rates, refuse_traces
 from ..petsc import PETSc
 from .bounded_system import BoundedSystem
 from .failures import make_petsc_failure
@@ -103,6 +103,7 @@ class Volume:
                 "route"
             )
         refuse_traces(f"Volume({self.method})", problem.surface)
+        refuse_rates(f"Volume({self.method})", problem)
         check_laws(
             f"Volume({self.method})", problem, unsymmetric=not isinstance(self.method, TaoTron)
         )

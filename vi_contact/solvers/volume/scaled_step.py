@@ -56,8 +56,14 @@ class ScaledStep:
         z_max, bound_max, b_max = system.max(max_abs(start), max_abs(reach), max_abs(self.b))
         if z_max == 0.0:
             z_max = self._estimate_size(self.b, b_max)
-        if b_max <= ROUND_OFF * self._norm * z_max:  # nothing, or what rounding left of it
-            b_max = max(b_max, float(system.max(max_abs(system.apply(start)))[0]))
+        # A load that is nothing, or what rounding has left of it, is no unit: forces are then those
+        # of the start, and those that press back what the start is beyond its bounds.
+        above = max_abs(np.maximum(start - upper, 0.0))
+        below = max_abs(np.maximum(lower - start, 0.0))
+        depth = float(system.max(max(above, below))[0])
+        if b_max <= ROUND_OFF * self._norm * max(z_max, depth):
+            of_start = float(system.max(max_abs(system.apply(start)))[0])
+            b_max = max(b_max, of_start, self._norm * depth)
         self.x_ref = _round_up_to_power_of_two(max(z_max, bound_max))
         self.r_ref = _round_up_to_power_of_two(b_max)
 
