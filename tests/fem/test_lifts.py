@@ -1,4 +1,4 @@
-"""Bodies that stages add and remove: columns placed in lifts, by hand, and fill on what has moved."""
+"""Bodies that stages add and remove: columns in lifts, by hand, and fill on what has moved."""
 
 from __future__ import annotations
 

@@ -51,7 +51,9 @@ Physical Curve("fill_top") = {6};
 Physical Curve("block_bottom") = {11};
 Physical Curve("sides") = {2, 4, 5, 7};
 """
-SOIL = 'E = "20 MPa"\nnu = 0.3\nrho = 2000\ntype = "MohrCoulomb"\ncohesion = 2e4\nphi = 30\npsi = 30\n'
+SOIL = (
+    'E = "20 MPa"\nnu = 0.3\nrho = 2000\ntype = "MohrCoulomb"\ncohesion = 2e4\nphi = 30\npsi = 30\n'
+)
 CASE = f"""
 title = "A block on fill"
 [mesh]
@@ -145,8 +147,12 @@ def test_a_restart_of_lifts_is_the_straight_run(tmp_path: Path) -> None:
         ('name = "fill"\ntype = "static"', 'name = "fill"\ntype = "dynamic"', "adds or removes a"),
         ('remove = "block"', 'remove = "fill_2"', "fill_2"),
         ('add = ["block"]', 'add = ["fill"]', "adds 'fill', which is there"),
-        ('remove = "block"', 'remove = 3', "remove = 3: give the name of a cell group, or a list"),
-        ('name = "ground"\ntype = "static"', 'name = "ground"\ntype = "static"\nadd = "fill"', "is not the first"),
+        ('remove = "block"', "remove = 3", "remove = 3: give the name of a cell group, or a list"),
+        (
+            'name = "ground"\ntype = "static"',
+            'name = "ground"\ntype = "static"\nadd = "fill"',
+            "is not the first",
+        ),
     ],
 )
 def test_wrong_lifts_are_refused_in_a_sentence(

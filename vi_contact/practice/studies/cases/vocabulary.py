@@ -44,7 +44,7 @@ from ....fem import (
 )
 from ....fem.contact.matching import Matching
 from ....laws.impact import VelocityUpdate
-from ....laws.materials import Damping, LinearElastic, Section
+from ....laws.materials import DampedBy, Damping, Density, LinearElastic, Section
 from ....laws.orthotropic import Orthotropic
 from ....laws.yielding import Modulus, Poisson, YieldingMaterial
 from ....meshes.gmsh_session import MeshScript
@@ -323,9 +323,9 @@ def heterogeneous(
 def iwan(
     E: Modulus,
     nu: Poisson,
-    rho: Annotated[float, Positive, Unit("kg/m³")],
+    rho: Density,
     curve: Annotated[SoilCurves | Sequence[tuple[float, float]], RATIO],
-    xi: Annotated[float, NotNegative, RATIO] = 0.0,
+    xi: DampedBy = 0.0,
 ) -> laws.Iwan:
     """Make an ``Iwan`` of pairs, or of G/Gmax of published curves.
 
