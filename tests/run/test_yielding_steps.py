@@ -269,9 +269,14 @@ class Forgetful(J2):
         return np.zeros(len(new["sigma"]))
 
 
-def column(comm: Any, law: Any, *, weight: bool = True, n: int = 6) -> vc.ContactProblem:
+def column(
+    comm: Any, law: Any, *, weight: bool = True, n: int = 6, mesh: Any = None
+) -> vc.ContactProblem:
     """Ground 1 m wide and 3 m high between smooth walls, under its own weight."""
-    mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0, 3.0), divisions=(2, n)), comm)
+    if mesh is None:
+        mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0, 3.0), divisions=(2, n)), comm)
+    else:
+        mesh, tags = mesh
     smooth = [fem.Prescribed(tags[side], components=(0,)) for side in ("left", "right")]
     system = fem.assemble(
         mesh,
@@ -442,12 +447,20 @@ def test_a_state_without_its_stresses_is_refused(comm: Any) -> None:
         run(throw(comm, "MohrCoulomb"), "J2", steps=1, state=found.state)
 
 
-@pytest.mark.serial
-def test_supports_of_a_body_that_yields_cannot_be_released(comm: Any) -> None:
-    problem = column(comm, SOIL)
+def test_supports_of_a_body_that_yields_are_released(comm: Any) -> None:
+    """The walls beside ground that has yielded go; what they bore stays, and nothing moves."""
+    sand = MohrCoulomb(1e8, 0.2, 2000.0, 0.0, 30.0, 0.0)
+    meshed = fem.build_mesh(BlockMesh(lengths=(1.0, 3.0), divisions=(2, 6)), comm)
+    problem = column(comm, sand, mesh=meshed)
     state = vc.static_equilibrium(problem)
-    with pytest.raises(InputError, match="release: the body yields"):
-        fem.release(problem, state, column(comm, SOIL))
+    bottom = fem.Prescribed(meshed[1]["bottom"])
+    weight = fem.BodyForce((0.0, -9.81 * sand.rho))
+    free = fem.assemble(meshed[0], sand, integration="bbar", prescribed=bottom, loads=weight)
+    alone = vc.ContactProblem(free, empty_surface(free.space.comm, 2))
+    begun, first = fem.release(problem, state, alone)
+    found = vc.simulate(begun, state=first, dt=1e-3, steps=10, progress=False)
+    moved = np.abs(found.state.u - first.u).max(initial=0.0)
+    assert moved <= 1e-9 * np.abs(state.u).max(initial=np.finfo(float).tiny)
 
 
 @pytest.mark.serial
@@ -530,3 +543,14 @@ def test_hexahedra_and_tetrahedra_are_thrown(comm: Any) -> None:
         assert found.facts["worst_certificate"] <= 1e-9
         assert found.facts["energy_defect"] <= 1e-9
         assert found.history["loss_plastic"][-1] > 0.05 * found.history["energy_kinetic"][0]
+
+
+@pytest.mark.serial
+def test_a_block_of_soil_stands_by_contact_alone(comm: Any) -> None:
+    """Nothing holds it but the ground, which bears its weight; it stands as elastic bodies do."""
+    problem = throw(comm, "MohrCoulomb")
+    standing = replace(problem, system=vc.with_weight(problem.system))
+    state = vc.static_equilibrium(standing)
+    weight = 1900.0 * 9.80665 * 0.5
+    assert state.certificate is not None and state.certificate <= 1e-9
+    assert state.r_n.sum() == pytest.approx(weight, rel=1e-8)

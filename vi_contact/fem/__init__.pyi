@@ -11,6 +11,7 @@ from .body.loads import Pressure as Pressure
 from .body.loads import TangentialTraction as TangentialTraction
 from .body.loads import Traction as Traction
 from .body.own_forms import Forms as Forms
+from .body.placing import place as place
 from .body.released_supports import release as release
 from .body.reservoir import Reservoir as Reservoir
 from .body.space import bodies_of as bodies_of

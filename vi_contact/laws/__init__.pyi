@@ -10,6 +10,7 @@ from .friction import ExponentialDecay as ExponentialDecay
 from .friction import SlipRateCoulomb as SlipRateCoulomb
 from .friction import StaticKinetic as StaticKinetic
 from .friction import Tresca as Tresca
+from .geostatic import Geostatic as Geostatic
 from .hyperelastic import NeoHookean as NeoHookean
 from .hyperelastic import SaintVenantKirchhoff as SaintVenantKirchhoff
 from .impact import ComponentReset as ComponentReset

@@ -42,6 +42,7 @@ from .yielding import (
 FITS = ("plane strain", "compression", "extension")
 Cohesion = Annotated[float, NotNegative, Unit("Pa"), "the cohesion"]
 BELOW_NINETY = Between(0.0, 90.0, "[)", "give degrees from 0 to less than 90")
+DEGREES = Unit("deg")
 SMALLEST = 1.0  # [degrees] below it a positive angle is probably in radians
 
 
@@ -99,8 +100,8 @@ class DruckerPrager(YieldingMaterial):
     """
 
     cohesion: Cohesion
-    phi: Annotated[float, BELOW_NINETY, "the angle of friction phi"]
-    psi: Annotated[float, BELOW_NINETY, "the angle of dilatancy psi"]
+    phi: Annotated[float, BELOW_NINETY, DEGREES, "the angle of friction phi"]
+    psi: Annotated[float, BELOW_NINETY, DEGREES, "the angle of dilatancy psi"]
     fit: str = "plane strain"
 
     def __post_init__(self) -> None:

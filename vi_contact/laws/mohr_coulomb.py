@@ -22,7 +22,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..core.algebra import Array
-from .drucker_prager import BELOW_NINETY, Cohesion, check_strength, divide_strength
+from .drucker_prager import BELOW_NINETY, DEGREES, Cohesion, check_strength, divide_strength
 from .mandel import PAIRS, find_principal, make_basis, norm, to_tensors
 from .yielding import (
     ROUND_OFF,
@@ -66,8 +66,8 @@ class MohrCoulomb(YieldingMaterial):
     """
 
     cohesion: Cohesion
-    phi: Annotated[float, BELOW_NINETY, "the angle of friction phi"]
-    psi: Annotated[float, BELOW_NINETY, "the angle of dilatancy psi"]
+    phi: Annotated[float, BELOW_NINETY, DEGREES, "the angle of friction phi"]
+    psi: Annotated[float, BELOW_NINETY, DEGREES, "the angle of dilatancy psi"]
 
     def __post_init__(self) -> None:
         super().__post_init__()

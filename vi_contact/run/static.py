@@ -39,6 +39,7 @@ from . import joint_steps
 from .materials import certify_material, keep_material, remember_material
 from .method import check_methods
 from .proximal import Proximal
+from .settling import Settling
 
 log = logging.getLogger(__name__)
 OPEN = 0.05  # of the area that touches at the start: so much may be open at rest without a warning
@@ -51,6 +52,10 @@ ADVICE_JOINT = (
 ADVICE_NONLINEAR = (
     "try smaller load steps, or march with damping where the body may buckle, and check the data"
 )
+ADVICE_FLOATING = (
+    "check that contact stops whatever the loads drive, clamp a part of the body, or march from "
+    "rest with damping"
+)
 
 
 def static_equilibrium(
@@ -59,6 +64,7 @@ def static_equilibrium(
     solver: Solver | None = None,
     t: float = 0.0,
     tolerance: float = TOLERANCE,
+    state: State | None = None,
 ) -> State:
     """Return the gravity stage, without excitation: K u = f(t) - B_nᵀ r_n - B_tᵀ r_t with contact.
 
@@ -71,6 +77,8 @@ def static_equilibrium(
         solver: Automatic() when None.
         t: the time [s] at which loads and prescribed displacements are taken.
         tolerance: of the certificate, relative.
+        state: from where points that rub slide, and where materials that yield go on; None: the
+            displacements at the start, without any past.
 
     Raises:
         InputError: the loads drive a rigid motion that nothing stops, so that there is no
@@ -79,15 +87,23 @@ def static_equilibrium(
     """
     owner = "static_equilibrium"
     check_problem_given(owner, problem)
-    agree(problem.surface.comm, owner, {"solver": solver, "t": t, "tolerance": tolerance})
+    agree(
+        problem.surface.comm,
+        owner,
+        {"solver": solver, "t": t, "tolerance": tolerance, "state": Parts(state)},
+    )
     check_methods(owner, solver, (), tolerance)
     t = number(owner, "t", t, unit="s")
     equilibria = Equilibria(problem, solver=solver, tolerance=tolerance)
-    with together(problem.surface.comm):
-        start = initial_state(problem, t)
-    state = equilibria.solve(start, t)
-    _warn_if_open(problem, state)
-    return state
+    if state is None:
+        with together(problem.surface.comm):
+            start = initial_state(problem, t)
+    else:
+        check_sizes(owner, problem, state)
+        start = state
+    reached = equilibria.solve(start, t)
+    _warn_if_open(problem, reached)
+    return reached
 
 
 def _warn_if_open(problem: ContactProblem, state: State) -> None:
@@ -153,16 +169,13 @@ class Equilibria:
         joint_steps.refuse_statics(problem)
         refuse_matrix(problem, self._K)
         given = (problem, self._K, 1.0, [solver], tolerance)
-        self.solver: Proximal | CertifiedSolver | NonlinearSolver
+        self.solver: Proximal | Settling | CertifiedSolver | NonlinearSolver
         if system.internal is None and system.floating:
             self.solver = Proximal(problem, self._K, solver, tolerance)
         elif system.internal is None:
             self.solver = CertifiedSolver(*given, advice=ADVICE)
         elif system.floating:
-            raise InputError(
-                "a static stage of a body that is not linear needs supports that hold it: "
-                "clamp a part of it, or march from rest with damping"
-            )
+            self.solver = Settling(*given, advice=ADVICE_FLOATING)
         else:
             self.solver = NonlinearSolver(*given, advice=ADVICE_NONLINEAR)
 

@@ -31,6 +31,7 @@ from ...core.quantities import Unit
 from ...core.system import Load, SemiDiscreteSystem
 from ...core.timing import report_time
 from ...laws.free_motions import Unheld, floats
+from ...laws.geostatic import Geostatic
 from ...laws.materials import Damping, Section
 from ...laws.yielding import YieldingMaterial
 from .. import compat
@@ -40,6 +41,7 @@ from ..matrices.petsc_rows import transfer
 from ..mesh.communicators import MpiComm, give_back
 from ..mesh.numbering import number_nodes
 from ..mesh.tagged_mesh import Cells, Facets
+from .absent import hold_absent, leave_out
 from .assembly_checks import (
     check_body,
     check_initial,
@@ -94,7 +96,8 @@ def assemble(
     degree: int = 1,
     quadrature_degree: int | None = None,
     integration: str = "full",
-    initial_stress: Annotated[Callable[[Array], Array] | None, Unit("Pa")] = None,
+    initial_stress: Annotated[Geostatic | Callable[[Array], Array] | None, Unit("Pa")] = None,
+    absent: Cells | Sequence[Cells] | None = None,
     space: Any = None,
     bcs: Any = (),
 ) -> SemiDiscreteSystem:
@@ -131,9 +134,14 @@ def assemble(
         integration: "full", or "selective" for nearly incompressible bodies of quadrilaterals or
             hexahedra, where each cell has one mean value of tr eps (``dilatation``). "bbar" is
             the like for materials that yield.
-        initial_stress: of a body that yields, at the displacement zero: points (k, d) [m] ->
+        initial_stress: of a body that yields, at the displacement zero: ``laws.Geostatic``, or
+            a function, points (k, d) [m] ->
             components (k, 4) xx, yy, zz, xy or (k, 6) xx, yy, zz, xy, yz, xz [Pa], tension
             positive. Loads should hold it in equilibrium.
+        absent: cells of bodies that are not there, which a later stage adds or an earlier one has
+            removed (``fem.place``, docs/guide/lifts.md). Nodes of these alone are held. () of
+            bodies that are all there, in a run whose stages add and remove some: stresses of
+            linear materials are remembered then too.
         initial_displacement: constant or points (k, d) -> (k, d) (eqs. 10, 10a), or (cells, value)
             pairs for several bodies. Where cells meet, the later pair counts; cells without a pair
             start from zero.
@@ -172,8 +180,10 @@ def assemble(
             "quadrature_degree": quadrature_degree,
             "integration": integration,
             "initial_stress": initial_stress,
+            "absent": absent,
         },
     )
+    material, missing = leave_out(mesh, material, absent, forms)
 
     # what is given: kinds, groups, conditions that go together
     bcs = as_tuple(bcs)
@@ -208,16 +218,18 @@ def assemble(
     check_nodes(comm, nodes, degree)
     if nodes.curved:
         refuse_folded(mesh)
-    # what conditions hold of the owned blocks of the displacement's space
-    places = [compat.locate_owned_blocks(V, held.facets.indices) for held in conditions.held]
-    supports = [
-        held.support(on_facets, mesh.geometry.dim)
-        for held, on_facets in zip(conditions.held, places, strict=True)
-    ]
+    supports = _locate_supports(V, conditions, mesh.geometry.dim)
     if bcs:
         supports += [values.support(nodes.owned) for values in read_values(mesh, V, bcs)]
+    supports += hold_absent(comm, V, nodes, missing)
     space = FemSpace(
-        V, nodes, supports, conditions.tied, degree=degree, quadrature_degree=quadrature_degree
+        V,
+        nodes,
+        supports,
+        conditions.tied,
+        degree=degree,
+        quadrature_degree=quadrature_degree,
+        absent=missing,
     )
     if bcs:
         refuse_contradictions(space)
@@ -290,6 +302,20 @@ def assemble(
     del absorbers, reduced
     give_back(mesh.comm)
     return system
+
+
+def _locate_supports(V: Any, conditions: Conditions, d: int) -> list[Any]:
+    """Return what conditions hold of the owned blocks of the displacement's space.
+
+    Args:
+        V: the space.
+        conditions: what holds the body.
+        d: dimension of the body.
+    """
+    places = [compat.locate_owned_blocks(V, held.facets.indices) for held in conditions.held]
+    return [
+        held.support(on_facets, d) for held, on_facets in zip(conditions.held, places, strict=True)
+    ]
 
 
 def _choose_forms(

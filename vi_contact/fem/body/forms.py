@@ -55,6 +55,7 @@ class ElasticForms:
         tells_stress: whether ``stress`` is known.
         symmetric: whether all matrices are.
         notes: what comes from where.
+        integration: the word of ``fem.assemble``.
         own_damping: whether the user gave a form of C.
         nonlinear: what is not linear, in words.
     """
@@ -63,6 +64,7 @@ class ElasticForms:
     initial: Any = None  # InitialStrains
     internal: Any = None  # InternalForms of a body that is not linear
     densities = True
+    integration = "full"
     tells_stress = True
     symmetric = True
     own_damping = False
@@ -137,6 +139,11 @@ class ElasticForms:
             self._anisotropic = _make_anisotropic(
                 cells, degree, materials, self.fields, section, space.dimension
             )
+
+    @property
+    def given_materials(self) -> list[tuple[Any, Any]]:
+        """Return (local cells, material) as they were given; materials that yield among them."""
+        return list(self.materials)
 
     def cellwise(self, name: str) -> Array:
         """Return the means of a field over the local cells, (cells,)."""

@@ -14,13 +14,14 @@ Staging as in PLAXIS, LS-DYNA (INTERFACE_SSI_STATIC) and Abaqus (*GEOSTATIC).
 import logging
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from ...core.algebra import Array, Mask, from_each, largest, max_abs
 from ...core.checks import several
 from ...core.errors import InputError
-from ...core.internal import remembers
+from ...core.internal import MATERIAL, remembers
 from ...core.joints import MEMORY, pose_joint
 from ...core.problem import ContactProblem
 from ...core.state_checks import check_problem_given, check_sizes
@@ -58,17 +59,12 @@ def release(
     stages = several("release", "earlier", earlier, "give a list of problems, or leave it out")
     for given in (static, problem, *stages):
         check_problem_given("release", given)
-        if remembers(given.system.internal):
-            raise InputError(
-                "release: the body yields, and its stresses cannot go on in another problem yet: "
-                "keep the supports, and hand the state to simulate(state=)"
-            )
     check_sizes("release", static, state)
 
     # where the body is, and that the problem begins there
     before, after = _spaces(static, problem)
     nodal = before.expand(static.cartesian(state.u), state.t)
-    added = _stand(before, after, nodal)
+    added = stand_on(before, after, nodal)
     u0 = after.restrict(nodal)
     still = np.zeros_like(u0)
     _, first = begin_from(problem, u0, still, state)
@@ -144,8 +140,8 @@ def begin_from(
         return 2.0 * x - surface.coupling @ x
 
     r_t = state.r_t if problem.frictional else None
-    # What a joint has gone through is its own, whatever supports there are.
-    memory = {name: x for name, x in state.memory.items() if name.startswith(MEMORY)}
+    # What joints and materials have gone through is their own, whatever supports there are.
+    memory = {name: x for name, x in state.memory.items() if name.startswith((MEMORY, MATERIAL))}
     first = State(
         t=0.0,
         k=0,
@@ -175,7 +171,7 @@ def _compute_missing(problem: ContactProblem, u0: Array, state: State, was_held:
     Raises:
         InputError: it is not zero and nothing was held.
     """
-    elastic = problem.system.internal_force(u0)
+    elastic = find_internal_force(problem, state, u0)
     force = np.asarray(elastic - problem.system.load.at_rest(0.0) + _contact_force(problem, state))
     # Of a body that only the prestress of a joint loads, the total reactions are the forces whose
     # rounding is missing.
@@ -194,8 +190,22 @@ def _compute_missing(problem: ContactProblem, u0: Array, state: State, was_held:
     return force
 
 
+def find_internal_force(problem: ContactProblem, state: State, u0: Array) -> Array:
+    """Return p(u0) (n,) [N], of materials that remember with what they know in a state. Collective.
+
+    Args:
+        problem: that begins.
+        state: its first one.
+        u0: (n,) its displacement, on the unknowns of the system [m].
+    """
+    internal: Any = problem.system.internal
+    if remembers(internal):
+        return np.asarray(internal.go_on(state.memory, u0).force(u0))
+    return np.asarray(problem.system.internal_force(u0))
+
+
 def find_removed_support(
-    before: ContactProblem, after: ContactProblem, force: Array
+    before: ContactProblem, after: ContactProblem, force: Array, elastic: Array
 ) -> tuple[str, float]:
     """Return (name, reaction [N]) of the removed support with most of a force. Collective.
 
@@ -206,13 +216,13 @@ def find_removed_support(
         before: the problem with the support.
         after: the problem without it.
         force: (n,) on the unknowns of ``after`` [N].
+        elastic: p(u0) (n,) there [N].
     """
     old, new = _spaces(before, after)
     candidates = [("", 0.0)]
     nodal = np.zeros(new.held.size)
     nodal[new.free] = force
     # forces that are round-off of these are none
-    elastic = after.system.internal_force(after.system.u0)
     size = largest(new.comm, max(max_abs(elastic), max_abs(force)))
     # of each support, and of the ties that are gone, what of the force is on what it held
     untied = np.isin(old.nodes, np.setdiff1d(old.tied_nodes, new.tied_nodes)), slice(None)
@@ -227,7 +237,7 @@ def find_removed_support(
     return max(candidates, key=lambda candidate: candidate[1])
 
 
-def _stand(before: FemSpace, after: FemSpace, nodal: Array) -> Mask:
+def stand_on(before: FemSpace, after: FemSpace, nodal: Array) -> Mask:
     """Let what ``after`` holds in addition stay where the body is (``after.stands``). Collective.
 
     Args:

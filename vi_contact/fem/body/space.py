@@ -132,6 +132,7 @@ class FemSpace(NodalSpace):
         unknowns: number of unknowns on all ranks.
         elimination: P of u_full = P u + U.
         forms: the ElasticForms of the system made on it; stress output needs them.
+        absent: which local cells are absent (``body.absent``); None where none ever are.
         stands: (k, d) where supports hold nodes that an earlier stage had moved [m], or None.
     """
 
@@ -144,6 +145,7 @@ class FemSpace(NodalSpace):
         *,
         degree: int = 1,
         quadrature_degree: int | None = None,
+        absent: Mask | None = None,
     ) -> None:
         """Give numbers to the unknowns. Collective.
 
@@ -154,6 +156,7 @@ class FemSpace(NodalSpace):
             tied: boundaries that move together.
             degree: that of V, 1 or 2.
             quadrature_degree: that of all forms, None for UFL's estimate.
+            absent: which local cells are absent; None where none ever are.
         """
         self.V = V
         self.mesh = V.mesh
@@ -208,6 +211,7 @@ class FemSpace(NodalSpace):
         )
         self.forms: Any = None
         self.stands: Array | None = None
+        self.absent = absent
 
     @property
     def translations(self) -> list[Array]:

@@ -131,6 +131,28 @@ class YieldingForce:
         """Return the rows (points, …) of an array (cells, points of a cell, …)."""
         return rows.reshape(-1, *rows.shape[2:])
 
+    def take_over(self, before: "YieldingForce", memory: Mapping[str, Array]) -> dict[str, Array]:
+        """Return the memory of a body of other present cells, where those that stay go on.
+
+        New cells have never yielded, and are free of stress.
+
+        Args:
+            before: the force of the body that has the memory.
+            memory: of its state.
+        """
+        taken: dict[str, Array] = {}
+        each = self._points.each
+        for part, old in zip(self._parts, before._parts, strict=True):
+            q = len(part.cells) * each
+            virgin = part.law.start(np.zeros((q, self._points.components)))
+            stay = np.isin(part.cells, old.cells)
+            rows = np.searchsorted(old.cells, part.cells[stay])
+            for name, values in virgin.items():
+                new = values.reshape(len(part.cells), each, *values.shape[1:])
+                new[stay] = memory[f"{old.name}{name}"][rows]
+                taken[f"{part.name}{name}"] = freeze(new)
+        return taken
+
     def find_cells(self, name: str) -> Indices:
         """Return the numbers (k,) of the owned cells of an array of the memory."""
         cells = self._cells_of(name)

@@ -5,15 +5,18 @@ M is that of the densities. K is the elastic stiffness, the reference of the ste
 
 import logging
 from collections.abc import Callable, Sequence
+from math import radians, sin
 from typing import Any
 
+import numpy as np
 import ufl
 
-from ...core.algebra import Array
+from ...core.algebra import Array, total
 from ...core.errors import InputError
 from ...core.internal import InternalForce
 from ...laws.drucker_prager import DruckerPrager
 from ...laws.materials import Damping, LinearElastic, PlaneStress, Section
+from ...laws.mohr_coulomb import MohrCoulomb
 from ...laws.yielding import YieldingMaterial
 from .. import compat
 from .forms import ElasticForms
@@ -58,9 +61,13 @@ class YieldingForms(ElasticForms):
             InputError: what materials that yield do not go with.
         """
         refuse_beside(space, [given for _, given in materials], section)
+        materials = keep_present(space, materials)
         elastic = [(where, getattr(given, "elastic", given)) for where, given in materials]
         super().__init__(space, elastic, section, damping)
-        warn_of_locking(space, integration)
+        if any(type(given) is not YieldingMaterial for _, given in materials):
+            warn_of_locking(space, integration)
+        self.integration = integration
+        self._given = materials
         self._points = StrainPoints(
             space,
             section.thickness,
@@ -69,9 +76,17 @@ class YieldingForms(ElasticForms):
         )
         self._parts = make_parts(self._points, materials)
         self._betas = [damping.coefficients(given)[1] for _, given in elastic]
+        if initial_stress is None:
+            _warn_of_weak_ratio(space, [given for _, given in materials])
         starts = make_starts(space, self._points, self._parts, initial_stress)
         self.internal: InternalForce = YieldingForce(space, self._points, self._parts, starts)
         self.notes = describe([given for _, given in materials], integration)
+
+    @property
+    def given_materials(self) -> list[tuple[Any, Any]]:
+        """Return (local cells, material) as they were given, of present cells. Collective."""
+        comm = self.space.comm
+        return [pair for pair in self._given if total(comm, float(len(pair[0]))) > 0.0]
 
     def matrix(self, name: str) -> Any:
         """Assemble the full matrix M, K, or C (PETSc), before elimination."""
@@ -133,6 +148,22 @@ def refuse_beside(space: FemSpace, materials: Sequence[Any], section: Section) -
             )
 
 
+def keep_present(space: FemSpace, materials: list[tuple[Any, Any]]) -> list[tuple[Any, Any]]:
+    """Return the materials with their present cells; a material of none stays, with no cells.
+
+    Args:
+        space: the body's unknowns.
+        materials: pairs of local cells and a material.
+    """
+    if space.absent is None:
+        return materials
+    kept = []
+    for where, given in materials:
+        cells = np.asarray(where)
+        kept.append((cells[~space.absent[cells]], given))
+    return kept
+
+
 def warn_of_locking(space: FemSpace, integration: str) -> None:
     """Warn, on rank 0, of cells that are too stiff where the flow keeps the volume."""
     if space.degree == 2 or integration == "bbar" or space.comm.rank != 0:
@@ -141,6 +172,27 @@ def warn_of_locking(space: FemSpace, integration: str) -> None:
         log.warning(LOCKS, "first-order triangles and tetrahedra", "degree=2")
     else:
         log.warning(LOCKS, "first-order cells", "integration='bbar' or degree=2")
+
+
+def _warn_of_weak_ratio(space: FemSpace, materials: Sequence[Any]) -> None:
+    """Warn, on rank 0, of soil without cohesion that level ground yields under its own weight.
+
+    Elastic ground at rest has the ratio nu/(1 - nu) of stresses, which must not be below Ka.
+    """
+    for given in materials:
+        if not isinstance(given, DruckerPrager | MohrCoulomb) or given.cohesion or space.comm.rank:
+            continue
+        sine = sin(radians(given.phi))
+        active = (1.0 - sine) / (1.0 + sine)
+        elastic = given.nu / (1.0 - given.nu)
+        if elastic < active:
+            log.warning(
+                "%s: level ground yields under its own weight, as nu/(1 - nu) = %.3g is below "
+                "Ka = %.3g: give a larger nu, or a stress at rest (initial_stress)",
+                type(given).__name__,
+                elastic,
+                active,
+            )
 
 
 def describe(materials: Sequence[Any], integration: str) -> tuple[str, ...]:

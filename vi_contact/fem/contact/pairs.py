@@ -29,7 +29,7 @@ from ...core.corners import FEATURE_ANGLE
 from ...core.errors import InputError
 from ...core.internal import turns
 from ...core.obstacles import PRESS_FIT
-from ...core.surfaces import ContactSurface
+from ...core.surfaces import ContactSurface, empty_surface
 from ...core.system import SemiDiscreteSystem
 from ...core.timing import report_time
 from ...meshes.rows import number_alike
@@ -45,6 +45,7 @@ from .frames import snap_to_axes, surface_of
 from .hinges import find_hinges, refuse_hinges
 from .matching import Matched, Matching, NodeToNode, Side
 from .nodes import Nodes, everywhere, join_nodes
+from .present import is_there, keep_present
 from .surface import contact_space, find_listed, make_prescribed_motion, merge_tied, nodes_on
 from .watching import Watched, sort_held, watch_nodes
 
@@ -104,6 +105,11 @@ def contact_pair(
     flag("contact_pair", "hinges", hinges)
     if matching is None:
         matching = NodeToNode()
+
+    facets1, present2 = keep_present(space, facets1, facets2)
+    facets2 = present2 or facets2
+    if not is_there(space, facets1):
+        return empty_surface(space.comm, space.dimension)
 
     # what faces what: nodes of both sides, and of each face of side 1 what it has in front
     side1, side2, shared = _two_sides(space, facets1, facets2)

@@ -26,7 +26,7 @@ from ...core.collective import agree
 from ...core.corners import FEATURE_ANGLE, PARALLEL, make_tangent_vectors
 from ...core.errors import InputError
 from ...core.obstacles import Obstacle, Touching, check_gap, locate_obstacle
-from ...core.surfaces import ContactSurface, list_tangential_columns
+from ...core.surfaces import ContactSurface, empty_surface, list_tangential_columns
 from ...core.system import SemiDiscreteSystem
 from ...core.timing import report_time
 from ..body.space import FemSpace, space_of
@@ -49,6 +49,7 @@ from .frames import FemSurface, NodalFrames, gather_frame_data, snap_to_axes, su
 from .hinges import gather_points, mark_hinges, refuse_hinges
 from .matching import EDGE_ON
 from .nodes import Nodes, ask_alike, everywhere, gather_rows, join_nodes, slots_of
+from .present import is_there, keep_present
 from .traced import find_own_tangents
 from .watching import Watched, sort_held, watch_nodes
 
@@ -122,6 +123,9 @@ def contact_surface(
     angle = check_angle("contact_surface", feature_angle)
     flag("contact_surface", "hinges", hinges)
     comm = space.comm
+    facets, _ = keep_present(space, facets)
+    if not is_there(space, facets):
+        return empty_surface(comm, space.dimension)
 
     # this rank's nodes of the facets, and those of them that are asked for: listed, or not clamped
     every = nodes_on(space, facets)
@@ -154,7 +158,6 @@ def contact_surface(
     directions = directions[order]
     gap = gap[order]
     slots = slots_of(comm, _places(nodes, chosen))
-    weights = nodes.weights * space.forms.section.thickness
     tell_corners(space, facets.name, nodes, slots, angle)
     # nodes of the boundary without a condition borrow a pressure, unless points are listed
     without = every.numbers if chosen is None else every.numbers[:0]
@@ -170,16 +173,21 @@ def contact_surface(
     kinds |= {
         "not listed": ~(held | wanted),
         "tied to another": wanted & ~np.isin(every.numbers, nodes.numbers),
+        "shared with another body": hinge,
     }
     watched: tuple[Watched, ...] = ()
     if chosen is None and not body_turns:
         lost, _ = split_at_corners(space, around, every.pick(held), angle)
         watched = _watch_held(space, facets.name, lost, obstacle)
-    kinds["shared with another body"] = hinge
     census = census_on_ranks(comm, facets.name, every, kinds, len(slots))
     tell(comm, census)
     surface = surface_of(
-        space, [conditions], gap0=gap, weights=weights, censuses=(census,), watched=watched
+        space,
+        [conditions],
+        gap0=gap,
+        weights=nodes.weights * space.forms.section.thickness,
+        censuses=(census,),
+        watched=watched,
     )
     return replace(surface, **make_prescribed_motion(space, conditions, surface))
 

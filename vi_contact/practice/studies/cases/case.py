@@ -4,7 +4,7 @@ A case file is a contact problem and its run in TOML, table by table the calls o
 interface.
 
 [mesh]            fem.build_mesh, fem.read_mesh        [scheme] [solver] [[escalation]]
-[material.NAME]   LinearElastic, Orthotropic           [[record]] [fields]
+[material.NAME]   LinearElastic, Orthotropic, MohrCoulomb, … [[record]] [fields]
 [system]          fem.assemble                         [run]      the other arguments of simulate
 [[contact]]       fem.contact_surface, .contact_pair   [gravity]  with_weight, static_equilibrium
 [friction] [impact] [mass] [[excitation]]              [[check]]  to compare with engineering.checks
@@ -40,6 +40,7 @@ from ....fem.mesh.tagged_mesh import Tags, build_mesh, read_mesh
 from ....laws.mass import ConsistentMass
 from ....laws.materials import LinearElastic
 from ....laws.orthotropic import Orthotropic
+from ....laws.yielding import YieldingMaterial
 from ....meshes.gmsh_session import MeshScript
 from ....run.cross_check import CrossChecked
 from ....run.files.folder import lock_folder, refuse_files_of_others, run_folder
@@ -98,7 +99,7 @@ TABLES: dict[str, Any] = {
     "mesh": MeshScript | MeshFile,
     "beam": BeamBody,
     "particle": ParticleBody,
-    "material": Mapping[str, LinearElastic | Orthotropic | Heterogeneous],
+    "material": Mapping[str, LinearElastic | Orthotropic | Heterogeneous | YieldingMaterial],
     "system": make_callee(assemble, keys={"clamped": "fixed"}),
     "strain_compatible": CALL,
     "contact": ContactSurface | Sequence[ContactSurface],
@@ -378,7 +379,7 @@ class Case:
             from ....run.static import static_equilibrium  # late: other runs need none of it
 
             static_solver = solver.primary if isinstance(solver, CrossChecked) else solver
-            state = static_equilibrium(problem, solver=static_solver)
+            state = static_equilibrium(problem, solver=static_solver, state=parts.begins)
         return arguments | {
             "problem": problem,
             "scheme": self._build_scheme(),
@@ -526,7 +527,8 @@ class Case:
             system = self._build_table("gravity", system=system, tags=tags)
         no_surface = empty_surface(system.algebra.comm, system.space.dimension)
         contacts = self._build_tables("contact", system=system, tags=tags)
-        surfaces = contacts or (no_surface,)
+        # Contact of bodies that are absent has no conditions.
+        surfaces = tuple(one for one in contacts if one.total) or (no_surface,)
         surface = joined_surfaces(*surfaces) if len(surfaces) > 1 else surfaces[0]
 
         # Motions that rise through the base are no inertia load as well.

@@ -93,7 +93,7 @@ def read_field(values: list[Any], members: Sequence[Any], spot: Spot) -> Places 
     letters = ""
     if FIELD in members:
         letters = "xyzt"
-    elif AT_START in members and spot.unit in ("m", "m/s"):
+    elif AT_START in members and spot.unit in ("m", "m/s", "Pa"):
         letters = "xyz"
     has_texts = any(isinstance(value, str) for value in values)
     if not letters or float in members or not has_texts:

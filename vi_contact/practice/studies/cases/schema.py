@@ -77,7 +77,9 @@ def write_schema() -> str:
 def _describe_stage(tables: Mapping[str, Any]) -> dict[str, Any]:
     """Return the schema of a stage: tables of the case that it replaces, whole or by keys."""
     kind = {"anyOf": [{"const": "static"}, {"const": "dynamic"}]}
+    names = {"anyOf": [_PLAIN[str], {"type": "array", "items": _PLAIN[str]}]}
     keys = {"name": _PLAIN[str], "type": kind, "release": _PLAIN[bool]}
+    keys |= {"add": names, "remove": names}
     parts = {key: tables[key] | {"required": []} for key in BY_KEY}
     return {
         "type": "object",

@@ -5,7 +5,7 @@ They say what each stage replaces in the tables of the case, and single keys of 
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -28,7 +28,7 @@ WHOLE = (
     "record",
     "fields",
 )
-KEYS = ("name", "type", "release", *BY_KEY, *WHOLE)
+KEYS = ("name", "type", "release", "add", "remove", *BY_KEY, *WHOLE)
 # what a static stage has no use for
 OF_MOTION = ("excitation", "scheme", "impact", "mass", "escalation")
 AT_REST = {"dt": 1.0, "steps": 0}  # [run] of a static stage: a row at t = 0
@@ -45,6 +45,7 @@ class Stage:
         static: it finds an equilibrium, and does not march.
         release: reactions of supports that it does without go on as forces.
         tables: its own, with those of the case.
+        changes: whether it adds or removes bodies.
         case: the ``Case`` that is made of them.
     """
 
@@ -53,6 +54,7 @@ class Stage:
     static: bool
     release: bool
     tables: Mapping[str, Any]
+    changes: bool = False
     case: Any = None
 
 
@@ -70,6 +72,7 @@ def split_stages(path: Path, tables: Mapping[str, Any]) -> list[Stage]:
         _read_stage(f"{path}: [[stage]] {number}", own, tables)
         for number, own in enumerate(own_tables, start=1)
     ]
+    stages = _list_absent(stages, own_tables)
     if stages[0].release:
         raise InputError(
             f"{stages[0].label} has release = true, and is the first stage: leave it out"
@@ -121,6 +124,60 @@ def _read_stage(label: str, own: Mapping[str, Any], tables: Mapping[str, Any]) -
         whole["run"] = {key: run[key] for key in run if key in ("tolerance", "out")} | AT_REST
     whole |= {key: own[key] for key in WHOLE if key in own}
     return Stage(f"{label} '{name}'", name, kind == "static", release, whole)
+
+
+def _list_absent(stages: list[Stage], own_tables: list[dict[str, Any]]) -> list[Stage]:
+    """Return the stages with the cell groups that are absent in each, in their [system].
+
+    A body that some stage adds is absent before it; all others are there from the beginning.
+
+    Args:
+        stages: of a case.
+        own_tables: their tables [[stage]].
+
+    Raises:
+        InputError: a stage adds what is there, or removes what is not; it is dynamic, or the first.
+    """
+    changes = [
+        (_read_bodies(stage, own, "add"), _read_bodies(stage, own, "remove"))
+        for stage, own in zip(stages, own_tables, strict=True)
+    ]
+    if not any(added or removed for added, removed in changes):
+        return stages
+    absent: list[str] = []
+    seen: set[str] = set()
+    for added, removed in changes:
+        absent += [name for name in added if name not in seen]
+        seen.update((*added, *removed))
+    result = []
+    for stage, (added, removed) in zip(stages, changes, strict=True):
+        if (added or removed) and (stage is stages[0] or not stage.static):
+            raise InputError(
+                f"{stage.label} adds or removes a body: give add and remove to a static stage that "
+                "is not the first, which begins with all bodies that no stage adds"
+            )
+        for name in added:
+            if name not in absent:
+                raise InputError(f"{stage.label} adds '{name}', which is there: leave it out")
+        for name in removed:
+            if name in absent:
+                raise InputError(f"{stage.label} removes '{name}', which is absent: leave it out")
+        absent = [name for name in absent if name not in added] + removed
+        system = {**stage.tables.get("system", {}), "absent": list(absent)}
+        tables = {**stage.tables, "system": system}
+        result.append(replace(stage, tables=tables, changes=bool(added or removed)))
+    return result
+
+
+def _read_bodies(stage: Stage, own: Mapping[str, Any], key: str) -> list[str]:
+    """Return the cell groups that a stage adds or removes; InputError for no names."""
+    value = own.get(key, [])
+    names = [value] if isinstance(value, str) else value
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise InputError(
+            f"{stage.label} has {key} = {quote(value)}: give the name of a cell group, or a list"
+        )
+    return names
 
 
 def _replace_keys(label: str, key: str, table: Any, own: Any) -> dict[str, Any]:

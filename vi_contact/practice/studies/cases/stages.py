@@ -20,11 +20,19 @@ import numpy as np
 from ....core.algebra import Array
 from ....core.errors import InputError
 from ....core.files import on_root, write_atomically
+from ....core.internal import remembers
 from ....core.own_files import inner_folder, is_own, make_inner_folder, read_text
 from ....core.problem import ContactProblem
 from ....core.state_checks import initial_state
 from ....core.step import State
-from ....fem.body.released_supports import begin_from, find_removed_support, release, same_supports
+from ....fem.body.placing import adds_or_removes, keep_gaps, place, same_bodies
+from ....fem.body.released_supports import (
+    begin_from,
+    find_internal_force,
+    find_removed_support,
+    release,
+    same_supports,
+)
 from ....fem.mesh.communicators import MpiComm
 from ....run.files.checkpoint import read_state_checksum
 from ....run.files.folder import (
@@ -257,7 +265,9 @@ def _run_stage(
             arguments["state"] = None  # the checkpoint has it
         solution = simulate(**arguments)
     earlier = reached.earlier
-    if reached.problem is not None:
+    if stage.changes:  # it is in equilibrium on its own supports alone
+        earlier = ()
+    elif reached.problem is not None:
         earlier = (*earlier, reached.problem)
     after = replace(
         reached,
@@ -290,6 +300,14 @@ def _enter(stage: Stage, reached: Reached, comm: Any) -> tuple[Reached, Parts, S
         return reached, parts, None
     problem: ContactProblem = stage.case.problem(comm, parts)
     try:
+        if not same_bodies(before, problem):
+            begun, first = place(before, state, problem)
+            placed = replace(parts, system=begun.system, surface=begun.surface, begins=first)
+            return replace(reached, force=0.0), placed, None
+        if adds_or_removes(problem):
+            surface = keep_gaps(before.surface, problem.surface, problem.system.u0)
+            parts = replace(parts, surface=surface)
+            problem = stage.case.problem(comm, parts)
         if same_supports(before, problem) and (stage.static or not reached.static):
             u, v = before.cartesian(state.u), before.cartesian(state.v)
             begun, first = begin_from(
@@ -303,7 +321,8 @@ def _enter(stage: Stage, reached: Reached, comm: Any) -> tuple[Reached, Parts, S
                 "the supports of that one between them, or change supports before the motion"
             )
         force = begun.system.load.constant - problem.system.load.constant
-        name, newtons = find_removed_support(before, begun, np.asarray(force))
+        elastic = find_internal_force(begun, first, begun.system.u0)
+        name, newtons = find_removed_support(before, begun, np.asarray(force), elastic)
         if name and not stage.release:
             raise InputError(
                 f"it removes the support '{name}', which carries {newtons:.4g} N: give release = "
@@ -311,5 +330,7 @@ def _enter(stage: Stage, reached: Reached, comm: Any) -> tuple[Reached, Parts, S
             )
     except InputError as error:
         raise InputError(f"{stage.label}: {error}") from error
-    begun_parts = replace(parts, system=begun.system)
+    # Materials that remember go on from there; a linear body is found from its displacements.
+    begins = first if remembers(begun.system.internal) else None
+    begun_parts = replace(parts, system=begun.system, begins=begins)
     return replace(reached, force=force), begun_parts, None if stage.static else first

@@ -24,6 +24,7 @@ from ....core import (
     Recorder,
     Scheme,
     Solver,
+    State,
 )
 from ....core.arguments import check_arguments
 from ....core.corners import FEATURE_ANGLE
@@ -43,8 +44,9 @@ from ....fem import (
 )
 from ....fem.contact.matching import Matching
 from ....laws.impact import VelocityUpdate
-from ....laws.materials import Damping, LinearElastic, Section
+from ....laws.materials import DampedBy, Damping, Density, LinearElastic, Section
 from ....laws.orthotropic import Orthotropic
+from ....laws.yielding import Modulus, Poisson, YieldingMaterial
 from ....meshes.gmsh_session import MeshScript
 from ....run import BySlipRate, ErrorControlled, HalvedAtImpact, Schedule
 from ....run.files.writer import FieldWriter
@@ -72,6 +74,7 @@ _KINDS: Mapping[ModuleType, tuple[Any, ...]] = {  # room -> the kinds of things 
     laws: (
         LinearElastic,
         Orthotropic,
+        YieldingMaterial,
         Section,
         Damping,
         FrictionLaw,
@@ -317,6 +320,27 @@ def heterogeneous(
     return Heterogeneous(make_field(E), make_field(nu), make_field(rho), make_field(xi))
 
 
+def iwan(
+    E: Modulus,
+    nu: Poisson,
+    rho: Density,
+    curve: Annotated[SoilCurves | Sequence[tuple[float, float]], RATIO],
+    xi: DampedBy = 0.0,
+) -> laws.Iwan:
+    """Make an ``Iwan`` of pairs, or of G/Gmax of published curves.
+
+    Args:
+        E: Young's modulus at small strains [Pa].
+        nu: Poisson's ratio [-].
+        rho: density [kg/m³].
+        curve: pairs (shear strain, G/Gmax), or curves of soil.
+        xi: damping ratio [-].
+    """
+    if isinstance(curve, SoilCurves):
+        curve = list(zip(curve.strain, curve.reduction, strict=True))
+    return laws.Iwan(E, nu, rho, curve, xi=xi)
+
+
 def analytic_gap(function: Annotated[Expression, Unit("m")]) -> core.AnalyticGap:
     """Make a ``core.AnalyticGap``."""
     return core.AnalyticGap(Places(function))
@@ -440,6 +464,7 @@ class Parts:
         mass: the law of a body without a mesh, or with a layer.
         tables: how many parts of the surface each [[contact]] has: one, or one for each joint that
             is found.
+        begins: where a static stage begins; None: in the displacements at the start.
     """
 
     system: SemiDiscreteSystem
@@ -449,6 +474,7 @@ class Parts:
     moved: bool = False
     mass: MassLaw | None = None
     tables: tuple[int, ...] = ()
+    begins: State | None = None
 
     @property
     def steady(self) -> bool:
@@ -473,6 +499,7 @@ _FUNCTIONS: Mapping[Any, Mapping[str, Callable[[], Any]]] = {
     Excitation: {"FirstModeHarmonic": lambda: first_mode_harmonic},
     Schedule: {"FirstModePeriod": lambda: first_mode_period},
     Heterogeneous: {"Heterogeneous": lambda: heterogeneous},
+    YieldingMaterial: {"Iwan": lambda: iwan},
     Obstacle: {"AnalyticGap": lambda: analytic_gap},
     Recorder: {"Resultants": lambda: resultants, "Probe": lambda: probe},
     BeamBody: {
@@ -502,6 +529,7 @@ _PLACES: tuple[tuple[Any, str], ...] = (
     (LinearElastic, "[material.NAME]"),
     (Orthotropic, "[material.NAME]"),
     (Heterogeneous, "[material.NAME]"),
+    (YieldingMaterial, "[material.NAME]"),
     (Damping, "[system.damping]"),
     (Section, "[system.section]"),
     (Traction, "[[system.loads]]"),

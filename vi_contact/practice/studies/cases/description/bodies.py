@@ -12,6 +12,7 @@ from .....fem.body.space import space_of
 from .....fem.mesh.tagged_mesh import Cells
 from .....fem.output.outline import longest_edge, outline
 from .....fem.output.sizes import measure_cells
+from .....laws.iwan import Iwan
 from .conditions import describe_supports
 
 # Of first order in a wave length: Kuhlemeyer and Lysmer (1973); the cautious take 10.
@@ -42,17 +43,19 @@ def describe_meshed_body(problem: ContactProblem, tags: Mapping[str, Any]) -> di
     measured = measure_cells(space.mesh)
     bodies = [
         _describe_body(space, tags, measured, cells, material)
-        for cells, material in space.forms.materials
+        for cells, material in space.forms.given_materials
     ]
     section = space.forms.section
+    bbar = space.forms.integration == "bbar"
     return {
         "degree": space.degree,
+        **({"integration": "bbar"} if bbar else {}),
         "section": {"type": type(section).__name__, "thickness": section.thickness},
         "box": find_box(space.comm, space.points),
         "mass": sum(body["mass"] for body in bodies),
         "bodies": bodies,
         "supports": list(describe_supports(space)),
-        "outline": outline(space, tags, [cells for cells, _ in space.forms.materials]),
+        "outline": outline(space, tags, [cells for cells, _ in space.forms.given_materials]),
     }
 
 
@@ -104,6 +107,8 @@ def _describe_body(
     numbers = {
         key: value for key, value in vars(material).items() if isinstance(value, int | float)
     }
+    if isinstance(material, Iwan):
+        numbers["elements"] = len(material.elements[0])
     if not numbers.get("xi", 1.0):  # a material without damping has no ratio to tell
         numbers.pop("xi")
     return {

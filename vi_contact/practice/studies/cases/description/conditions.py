@@ -10,6 +10,7 @@ import numpy as np
 from .....core.algebra import Array, largest
 from .....core.problem import ContactProblem
 from .....core.step import AXES
+from .....fem.body.absent import NAME as ABSENT
 from .....fem.mesh.tagged_mesh import Facets
 from .....fem.output.outline import facets_with_cells
 from ..bodies import Body
@@ -25,6 +26,8 @@ def describe_supports(space: Any) -> Iterator[dict[str, Any]]:
     Ties of sides to each other are among it.
     """
     for support in space.prescribed:
+        if support.name == ABSENT:  # bodies that are not there are no support
+            continue
         kind = "fixed" if support.components is None else "roller, fixed"
         if support.moves:
             kind = "moved"

@@ -68,7 +68,7 @@ def describe(
         "title": case.tables.get("title") or case.path.stem,
         "dimension": problem.system.space.dimension,
         "unknowns": problem.system.space.unknowns,
-        **{key: body[key] for key in ("degree", "section", "box") if key in body},
+        **{key: body[key] for key in ("degree", "integration", "section", "box") if key in body},
         "mass": body["mass"],
         "groups": [
             {"name": name, "kind": type(group).__name__.lower()} for name, group in tags.items()

@@ -22,6 +22,13 @@ NUMBERS = {
     "G12": ("shear modulus G12", "Pa", "modulus"),
     "G13": ("shear modulus G13", "Pa", "modulus"),
     "G23": ("shear modulus G23", "Pa", "modulus"),
+    "yield_stress": ("yield stress", "Pa", "stress"),
+    "isotropic": ("isotropic hardening", "Pa", "modulus"),
+    "kinematic": ("kinematic hardening", "Pa", "modulus"),
+    "cohesion": ("cohesion c", "Pa", "stress"),
+    "phi": ("angle of friction phi", "deg", ""),
+    "psi": ("angle of dilatancy psi", "deg", ""),
+    "elements": ("elements of Iwan", NONE, ""),
     "length": ("length", "m", "size"),
     "area": ("area of the section", "m²", ""),
     "inertia": ("second moment of area", "m⁴", ""),
@@ -52,6 +59,8 @@ def list_model(model: Model, pen: Pen) -> Iterator[Row]:
             yield pen.row(f"largest {name} at the start", start[name], unit)
     if "unknowns" in model:
         degree = f"degree {model['degree']}" if "degree" in model else ""
+        if model.get("integration") == "bbar":
+            degree += ", one mean dilatation a cell (bbar)"
         yield say("unknowns", model["unknowns"], degree)
     yield from _list_groups(model)
 

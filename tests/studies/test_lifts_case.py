@@ -1,0 +1,165 @@
+"""Case files whose stages add and remove bodies: restarts, contact, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from vi_contact import InputError
+from vi_contact.practice.studies import read_case
+
+GEO = """
+// A pit beside a block: ground of three parts, and a block that is placed on the left one.
+w = 2.0;
+h = 1.0;
+Point(1) = {0, 0, 0, 0.5};
+Point(2) = {w, 0, 0, 0.5};
+Point(3) = {w, h, 0, 0.5};
+Point(4) = {0, h, 0, 0.5};
+Point(5) = {w, 2 * h, 0, 0.5};
+Point(6) = {0, 2 * h, 0, 0.5};
+Line(1) = {1, 2};
+Line(2) = {2, 3};
+Line(3) = {3, 4};
+Line(4) = {4, 1};
+Line(5) = {3, 5};
+Line(6) = {5, 6};
+Line(7) = {6, 4};
+Curve Loop(1) = {1, 2, 3, 4};
+Plane Surface(1) = {1};
+Curve Loop(2) = {-3, 5, 6, 7};
+Plane Surface(2) = {2};
+Point(11) = {0, 2 * h, 0, 0.5};
+Point(12) = {w, 2 * h, 0, 0.5};
+Point(13) = {w, 3 * h, 0, 0.5};
+Point(14) = {0, 3 * h, 0, 0.5};
+Line(11) = {11, 12};
+Line(12) = {12, 13};
+Line(13) = {13, 14};
+Line(14) = {14, 11};
+Curve Loop(3) = {11, 12, 13, 14};
+Plane Surface(3) = {3};
+Physical Surface("ground") = {1};
+Physical Surface("fill") = {2};
+Physical Surface("block") = {3};
+Physical Curve("bottom") = {1};
+Physical Curve("fill_top") = {6};
+Physical Curve("block_bottom") = {11};
+Physical Curve("sides") = {2, 4, 5, 7};
+"""
+SOIL = (
+    'E = "20 MPa"\nnu = 0.3\nrho = 2000\ntype = "MohrCoulomb"\ncohesion = 2e4\nphi = 30\npsi = 30\n'
+)
+CASE = f"""
+title = "A block on fill"
+[mesh]
+type = "GeoFile"
+path = "pit.geo"
+[material.ground]
+{SOIL}
+[material.fill]
+{SOIL}
+[material.block]
+E = "1 GPa"
+nu = 0.2
+rho = 2400
+[system]
+degree = 2
+fixed = "bottom"
+damping = {{type = "Rayleigh", alpha = 0.0, beta = 1e-3}}
+[gravity]
+[[contact]]
+type = "contact_pair"
+name = "foot"
+facets1 = "block_bottom"
+facets2 = "fill_top"
+[friction]
+type = "Coulomb"
+mu = 0.5
+[[excitation]]
+type = "Ricker"
+amplitude = 3.0
+frequency = 6.0
+[run]
+dt = 0.005
+steps = 12
+[[stage]]
+name = "ground"
+type = "static"
+[[stage]]
+name = "fill"
+type = "static"
+add = "fill"
+[[stage]]
+name = "block"
+type = "static"
+add = ["block"]
+[[stage]]
+name = "shock"
+type = "dynamic"
+[[stage]]
+name = "rest"
+type = "static"
+remove = "block"
+[[stage]]
+name = "again"
+type = "dynamic"
+"""
+WEIGHT = 2400 * 9.80665 * 2.0  # N/m
+
+
+def write(folder: Path, text: str = CASE) -> Path:
+    (folder / "pit.geo").write_text(GEO)
+    path = folder / "pit.toml"
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.serial
+def test_a_restart_of_lifts_is_the_straight_run(tmp_path: Path) -> None:
+    """Six stages, a quake between: stopped in the first motion, and gone on, the last state is the
+    same to the last bit; every ledger is closed, and the block has stood on the fill."""
+    path = write(tmp_path)
+    straight = read_case(path).run(MPI.COMM_SELF, progress=False, out=tmp_path / "straight")
+    assert straight.facts["energy_defect"] <= 1e-9
+    folder = tmp_path / "halves"
+    short = path.with_name("short.toml")
+    short.write_text(CASE.replace("steps = 12", "steps = 5"))
+    read_case(short).run(MPI.COMM_SELF, progress=False, out=folder)
+    gone_on = read_case(path).run(MPI.COMM_SELF, progress=False, out=folder, restart=True)
+    assert np.array_equal(gone_on.state.u, straight.state.u)
+    for name, values in straight.state.memory.items():
+        assert np.array_equal(gone_on.state.memory[name], values)
+    block = np.genfromtxt(
+        tmp_path / "straight" / "stages" / "3_block" / "history.csv", delimiter=",", names=True
+    )
+    assert block["contact_force_y"] == pytest.approx(WEIGHT, rel=1e-7)
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('name = "fill"\ntype = "static"', 'name = "fill"\ntype = "dynamic"', "adds or removes a"),
+        ('remove = "block"', 'remove = "fill_2"', "fill_2"),
+        ('add = ["block"]', 'add = ["fill"]', "adds 'fill', which is there"),
+        ('remove = "block"', "remove = 3", "remove = 3: give the name of a cell group, or a list"),
+        (
+            'name = "ground"\ntype = "static"',
+            'name = "ground"\ntype = "static"\nadd = "fill"',
+            "is not the first",
+        ),
+    ],
+)
+def test_wrong_lifts_are_refused_in_a_sentence(
+    tmp_path: Path, old: str, new: str, words: str
+) -> None:
+    with pytest.raises(InputError) as caught:
+        case: Any = read_case(write(tmp_path, CASE.replace(old, new, 1)))
+        case.problem(MPI.COMM_SELF)
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,109 @@
+"""Let cells of a mesh be absent: of bodies that are not yet placed, or that have been removed.
+
+Absent cells have neither stiffness nor mass, and carry nothing. A node of absent cells alone is
+held where it is, so that it is no unknown; one that a present cell shares belongs to this cell.
+
+Stresses of a body whose stages add and remove parts are those of its past and not of its
+displacement. All its materials remember their stress therefore, and one that is linear is taken as
+one that never yields.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ...core.algebra import Mask, from_each, total
+from ...core.errors import InputError
+from ...laws.materials import LinearElastic
+from ...laws.yielding import YieldingMaterial
+from .. import compat
+from ..mesh.communicators import MpiComm
+from ..mesh.group_checks import cells_of
+from ..mesh.numbering import NodeTable
+from ..mesh.tagged_mesh import Cells, local_count
+from .dirichlet import GivenValues
+from .loads import Support
+
+NAME = "absent bodies"
+
+
+def leave_out(mesh: Any, material: Any, absent: Any, forms: Any) -> tuple[Any, Mask | None]:
+    """Return the materials of a body, and which local cells are absent. Collective.
+
+    Both are as given, and None, where nobody asks.
+
+    Args:
+        mesh: of the body.
+        material: one, or (cells, material) pairs.
+        absent: cell groups, one of them, or None.
+        forms: the user's own, or None.
+    """
+    missing = _find_absent(mesh, absent)
+    return (material if missing is None else _let_remember(material, forms)), missing
+
+
+def _find_absent(mesh: Any, absent: Any) -> Mask | None:
+    """Return which local cells, ghosts among them, are absent; None where nobody asks. Collective.
+
+    Args:
+        mesh: of the body.
+        absent: cell groups, one of them, or None.
+
+    Raises:
+        InputError: what is no cell group of this mesh, and where all cells are absent.
+    """
+    if absent is None:
+        return None
+    groups = [absent] if isinstance(absent, Cells) else list(absent)
+    missing = np.zeros(local_count(mesh, 0), dtype=bool)
+    for group in groups:
+        missing[cells_of("assemble", "absent", group, mesh).indices] = True
+    if not total(MpiComm(mesh.comm), float((~missing).sum())):
+        raise InputError("assemble: all cells of the mesh are absent; leave one body there")
+    return missing
+
+
+def _let_remember(material: Any, forms: Any) -> Any:
+    """Return materials of which the linear ones remember their stress.
+
+    Args:
+        material: one, or (cells, material) pairs.
+        forms: the user's own, or None.
+
+    Raises:
+        InputError: materials that do not yield and are not LinearElastic, and forms.
+    """
+    if forms is not None:
+        raise InputError(
+            "assemble: bodies are added and removed where materials state their stress: give "
+            "material= in the place of forms="
+        )
+    if isinstance(material, Sequence):
+        return [(cells, _let_remember(own, None)) for cells, own in material]
+    if isinstance(material, LinearElastic):
+        return YieldingMaterial(material.E, material.nu, material.rho, xi=material.xi)
+    if material is not None and not isinstance(material, YieldingMaterial):
+        raise InputError(
+            f"assemble: bodies of {type(material).__name__} cannot be added or removed: give "
+            "LinearElastic or a material that yields"
+        )
+    return material
+
+
+def hold_absent(comm: MpiComm, V: Any, nodes: NodeTable, missing: Mask | None) -> list[Support]:
+    """Return the support of the nodes that no present cell has; none where nobody asks. Collective.
+
+    Args:
+        comm: the ranks.
+        V: the displacement's space.
+        nodes: its nodes.
+        missing: which local cells are absent, or None.
+    """
+    if missing is None:
+        return []
+    blocks = np.unique(compat.cell_blocks(V)[~missing])
+    present = np.unique(np.concatenate(from_each(comm, nodes.numbers[blocks])))
+    alone = ~np.isin(nodes.numbers, present)
+    mask = np.repeat(alone[:, None], V.mesh.geometry.dim, axis=1)
+    return [GivenValues(NAME, mask, np.zeros(mask.shape), False).support(nodes.owned)]
