@@ -28,10 +28,11 @@ from .problem import LastIterate, ScaledDelassus, ScaledProblem
 FOLLOW = 0.1  # of the residual: what the shifted problem may leave where the shift follows
 ENOUGH = 1e-2  # of the tolerance: a residual from which on no more is asked for
 MOST_STEPS = 60  # of Newton
-SLOW = 0.5  # of the residual: a step that leaves more of it is slow,
-PATIENCE = 4  # and after so many in a row, below the goal, rounding is reached. With states that
-# stay it is the rounding of q, which no r removes where traces depend on one another, below
-STALLED = 1e-6  # of the residual of r = 0; the certificate of the step judges
+SLOW = 0.5  # of the residual: a step that leaves more of it is slow
+PATIENCE = 4  # slow steps in a row, after which only rounding is left below the goal
+# Where traces depend on one another q has rounding that no r removes. With states that stay the
+# search ends below this, of the residual of r = 0, and the certificate of the step judges.
+STALLED = 1e-6
 SEEN = 2  # how often a set of states may come before Newton goes in circles
 
 
@@ -170,7 +171,8 @@ class SparseNewton:
             slow = 0 if residual <= SLOW * least else slow + 1
             stays = stays + 1 if states.key == before else 0
             if residual < least:
-                best, least = r, residual
+                best = r
+                least = residual
             if residual <= max(ENOUGH * goal, step.rounding(r)):
                 break
             if slow >= PATIENCE and least <= goal:
@@ -229,8 +231,9 @@ def _put(states: States, r: Array) -> Array:
 def _block_matrix(blocks: Array) -> sp.csr_matrix:
     """Return the matrix of blocks (m, d, d) on its diagonal."""
     m, d, _ = blocks.shape
-    places = np.arange(m), np.arange(m + 1)
-    matrix = sp.csr_matrix(sp.bsr_matrix((blocks, *places), shape=(m * d, m * d)))
+    columns = np.arange(m)
+    starts = np.arange(m + 1)
+    matrix = sp.csr_matrix(sp.bsr_matrix((blocks, columns, starts), shape=(m * d, m * d)))
     matrix.eliminate_zeros()
     return matrix
 
