@@ -71,7 +71,7 @@ WHERE = (
     "vi_contact.run.files.reading.read_bytes",
     "vi_contact.run.files.reading.open_hdf5",
     "vi_contact.run.files.reading.parse_numbers",
-    "vi_contact.practice.plots.deformed.open_hdf5",
+    "vi_contact.core.hdf5.StoredFile",
     "vi_contact.core.hdf5.StoredGroup.__getitem__",
     "vi_contact.practice.studies.report.sketch",
     "matplotlib.figure.Figure.savefig",

@@ -124,6 +124,22 @@ def test_frames_have_what_points_tell(comm: Any, shared_tmp: Path) -> None:
     assert frames["XDMF"]["plastic_strain"].max() > 1e-5
 
 
+@pytest.mark.serial
+def test_names_of_what_points_tell_are_taken_where_bodies_yield(comm: Any, tmp_path: Path) -> None:
+    """A user's own plasticity may have the name where the body is elastic."""
+    problem = throw(comm, n=2)
+    own = {"plastic_strain": lambda state: fem.as_function(problem, state, "plastic_strain")}
+    with pytest.raises(InputError, match="'plastic_strain', which frames have already"):
+        vc.simulate(
+            problem,
+            dt=step_of("J2", 2),
+            steps=1,
+            out=tmp_path,
+            fields=fem.XDMF(functions=own),
+            progress=False,
+        )
+
+
 def test_loops_of_named_points(comm: Any) -> None:
     """In a run the recorder has the stress and the strain of the nearest point of integration."""
     problem = throw(comm, n=2)

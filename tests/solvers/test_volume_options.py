@@ -66,6 +66,7 @@ class Rubbing:
 
     def __init__(self, c: Case, friction: Any) -> None:
         self.surface, self.friction = c.step.surface, friction
+        self.joint = None
         self.frictional = not isinstance(friction, Frictionless)
         self.system = c.step.A  # for its algebra
 

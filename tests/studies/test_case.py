@@ -688,6 +688,7 @@ def test_case_files_know_the_public_names() -> None:
     # no words
     others = {
         "Geostatic",
+        "JointWater",
         "NeoHookean",
         "Prestress",
         "SaintVenantKirchhoff",

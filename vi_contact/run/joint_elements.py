@@ -11,7 +11,6 @@ J. Geophys. Res. 110 (2005) B12307.
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..core.algebra import Array
 from ..core.problem import ContactProblem
@@ -102,6 +101,8 @@ def _find_moduli(forms: Any, points: Array) -> tuple[Array, Array]:
     count = min(NEIGHBOURS, owned)
     if not count:
         return np.full(len(points), np.inf), np.full(len(points), np.inf)
+    from scipy.spatial import cKDTree  # late: it takes a while
+
     _, near = cKDTree(centroids).query(points, k=count)
     near = np.reshape(near, (len(points), count))
     return young[near].min(axis=1), 0.5 * plane[near].min(axis=1)

@@ -28,33 +28,16 @@ from .loads import Support
 NAME = "absent bodies"
 
 
-def leave_out(mesh: Any, material: Any, absent: Any, forms: Any) -> tuple[Any, Mask | None]:
-    """Return the materials of a body, and which local cells are absent. Collective.
-
-    Both are as given, and None, where nobody asks.
+def find_absent(mesh: Any, absent: Any) -> Mask:
+    """Return which local cells, ghosts among them, are absent. Collective.
 
     Args:
         mesh: of the body.
-        material: one, or (cells, material) pairs.
-        absent: cell groups, one of them, or None.
-        forms: the user's own, or None.
-    """
-    missing = _find_absent(mesh, absent)
-    return (material if missing is None else _let_remember(material, forms)), missing
-
-
-def _find_absent(mesh: Any, absent: Any) -> Mask | None:
-    """Return which local cells, ghosts among them, are absent; None where nobody asks. Collective.
-
-    Args:
-        mesh: of the body.
-        absent: cell groups, one of them, or None.
+        absent: cell groups, or one of them.
 
     Raises:
         InputError: what is no cell group of this mesh, and where all cells are absent.
     """
-    if absent is None:
-        return None
     groups = [absent] if isinstance(absent, Cells) else list(absent)
     missing = np.zeros(local_count(mesh, 0), dtype=bool)
     for group in groups:
@@ -64,7 +47,7 @@ def _find_absent(mesh: Any, absent: Any) -> Mask | None:
     return missing
 
 
-def _let_remember(material: Any, forms: Any) -> Any:
+def let_remember(material: Any, forms: Any) -> Any:
     """Return materials of which the linear ones remember their stress.
 
     Args:
@@ -80,7 +63,7 @@ def _let_remember(material: Any, forms: Any) -> Any:
             "material= in the place of forms="
         )
     if isinstance(material, Sequence):
-        return [(cells, _let_remember(own, None)) for cells, own in material]
+        return [(cells, let_remember(own, None)) for cells, own in material]
     if isinstance(material, LinearElastic):
         return YieldingMaterial(material.E, material.nu, material.rho, xi=material.xi)
     if material is not None and not isinstance(material, YieldingMaterial):
@@ -91,17 +74,15 @@ def _let_remember(material: Any, forms: Any) -> Any:
     return material
 
 
-def hold_absent(comm: MpiComm, V: Any, nodes: NodeTable, missing: Mask | None) -> list[Support]:
-    """Return the support of the nodes that no present cell has; none where nobody asks. Collective.
+def hold_absent(comm: MpiComm, V: Any, nodes: NodeTable, missing: Mask) -> list[Support]:
+    """Return the support of the nodes that no present cell has. Collective.
 
     Args:
         comm: the ranks.
         V: the displacement's space.
         nodes: its nodes.
-        missing: which local cells are absent, or None.
+        missing: which local cells are absent.
     """
-    if missing is None:
-        return []
     blocks = np.unique(compat.cell_blocks(V)[~missing])
     present = np.unique(np.concatenate(from_each(comm, nodes.numbers[blocks])))
     alone = ~np.isin(nodes.numbers, present)

@@ -41,7 +41,7 @@ from ..matrices.petsc_rows import transfer
 from ..mesh.communicators import MpiComm, give_back
 from ..mesh.numbering import number_nodes
 from ..mesh.tagged_mesh import Cells, Facets
-from .absent import hold_absent, leave_out
+from .absent import find_absent, hold_absent, let_remember
 from .assembly_checks import (
     check_body,
     check_initial,
@@ -60,7 +60,7 @@ from .initial_strains import InitialStrain, InitialStrains
 from .linear_forms import AnyLoad, LinearForm, Loads
 from .loads import BodyForce, Prescribed, Traction, evaluate
 from .own_forms import Forms, OwnForms
-from .reservoir import Reservoir, assemble_water, list_pressures
+from .reservoir import Reservoir, list_pressures
 from .space import FemSpace, translations
 from .ties import Tied
 from .turning_forms import TurningForms
@@ -183,7 +183,8 @@ def assemble(
             "absent": absent,
         },
     )
-    material, missing = leave_out(mesh, material, absent, forms)
+    missing = None if absent is None else find_absent(mesh, absent)
+    material = material if missing is None else let_remember(material, forms)
 
     # what is given: kinds, groups, conditions that go together
     bcs = as_tuple(bcs)
@@ -218,10 +219,14 @@ def assemble(
     check_nodes(comm, nodes, degree)
     if nodes.curved:
         refuse_folded(mesh)
-    supports = _locate_supports(V, conditions, mesh.geometry.dim)
+    # what conditions hold of the owned blocks of the displacement's space
+    supports = [
+        held.support(compat.locate_owned_blocks(V, held.facets.indices), mesh.geometry.dim)
+        for held in conditions.held
+    ]
     if bcs:
         supports += [values.support(nodes.owned) for values in read_values(mesh, V, bcs)]
-    supports += hold_absent(comm, V, nodes, missing)
+    supports += [] if missing is None else hold_absent(comm, V, nodes, missing)
     space = FemSpace(
         V,
         nodes,
@@ -261,8 +266,13 @@ def assemble(
     v0 = _evaluate_initial(space, "initial velocity", initial_velocity)
 
     # the equations of the free unknowns, with the loads of prescribed motions and of boundaries
-    water = assemble_water(reservoir, space, section.thickness)
-    reduced = _reduce(body, absorbers, algebra, base_inertia=base_inertia, water=water)
+    reduced = _reduce(
+        body,
+        absorbers,
+        algebra,
+        base_inertia=base_inertia,
+        water=None if reservoir is None else reservoir.assemble_mass(space, section.thickness),
+    )
     M = reduced.M
     base_mass = None
     if reduced.momenta is not None:
@@ -302,20 +312,6 @@ def assemble(
     del absorbers, reduced
     give_back(mesh.comm)
     return system
-
-
-def _locate_supports(V: Any, conditions: Conditions, d: int) -> list[Any]:
-    """Return what conditions hold of the owned blocks of the displacement's space.
-
-    Args:
-        V: the space.
-        conditions: what holds the body.
-        d: dimension of the body.
-    """
-    places = [compat.locate_owned_blocks(V, held.facets.indices) for held in conditions.held]
-    return [
-        held.support(on_facets, d) for held, on_facets in zip(conditions.held, places, strict=True)
-    ]
 
 
 def _choose_forms(

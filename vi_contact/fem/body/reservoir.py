@@ -260,14 +260,3 @@ def list_pressures(reservoir: Any) -> list[Pressure]:
     instance("assemble", "reservoir", reservoir, Reservoir, remedy)
     pressures: list[Pressure] = reservoir.make_loads()
     return pressures
-
-
-def assemble_water(reservoir: Reservoir | None, space: FemSpace, thickness: float) -> Any:
-    """Return M_w of a reservoir (PETSc); None without one, or without moving water. Collective.
-
-    Args:
-        reservoir: the water, or None.
-        space: the body's unknowns.
-        thickness: of the section [m].
-    """
-    return None if reservoir is None else reservoir.assemble_mass(space, thickness)

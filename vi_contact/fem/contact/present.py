@@ -5,7 +5,6 @@ nearest facet of side 2, by their middles, is absent: what it faces is not there
 """
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ...core.algebra import Array, Mask, from_each, total
 from .. import compat
@@ -34,6 +33,8 @@ def keep_present(
     middles = np.concatenate(from_each(space.comm, _find_middles(space, facets2)))
     flags = np.concatenate(from_each(space.comm, there2))
     if len(middles) and len(facets1.indices):
+        from scipy.spatial import cKDTree  # late: it takes a while
+
         nearest = cKDTree(middles).query(_find_middles(space, facets1))[1]
         there1 = there1 & flags[nearest]
     return _pick(facets1, there1), _pick(facets2, there2)

@@ -118,7 +118,8 @@ _POINTS = {
     "mobilised_strength": "mobilised_strength",
 }
 """What frames of a body that yields have for each cell, and how its points call it."""
-TAKEN = (*_VECTORS, *_RUBBING, "contact_pressure", "contact_status", *_POINTS)
+TAKEN = (*_VECTORS, *_RUBBING, "contact_pressure", "contact_status", "von_mises")
+"""Names that Functions of the user cannot have in any run."""
 
 
 @dataclass(frozen=True)
@@ -248,6 +249,7 @@ class FrameValues:
         self.cell_names: tuple[str, ...] = ()
         if self._yields:
             self.cell_names = tuple(_POINTS)
+            check_names(owner, functions, self.cell_names)
         elif cells.von_mises is not None:
             self.cell_names = ("von_mises",)
         self._problem = problem
