@@ -301,7 +301,10 @@ def save(figure: Any, path: str | Path, title: str | None = None) -> Path:
     """
     if title is not None:
         figure.suptitle(title)
-    figure.align_ylabels()
+    # One row has nothing to align, and the label of an axis of equal scales would be cut off.
+    places = [axes.get_subplotspec() for axes in figure.axes]
+    if len({place.rowspan.start for place in places if place is not None}) > 1:
+        figure.align_ylabels()
     return write_picture(figure, path)
 
 
