@@ -104,6 +104,21 @@ def test_lambda_is_told_by_a_check(tmp_path: Path, capsys: pytest.CaptureFixture
 
 
 @pytest.mark.serial
+def test_words_of_laws_are_read(tmp_path: Path) -> None:
+    joint = (
+        read_case(written(tmp_path, BLOCK.replace('opening = "0.2 mm"', 'softening = "brittle"')))
+        .problem(COMM)
+        .joint
+    )
+    assert joint.softening == "brittle"
+    start = BLOCK.index("joint = {")
+    end = BLOCK.index("[run]")
+    fault = 'joint = {type = "RateAndState", a = 0.01, b = 0.015, mu0 = 0.6, V0 = 1e-6, dc = 1e-4, '
+    text = f'{BLOCK[:start]}{fault}law = "slip"}}\n{BLOCK[end:]}'
+    assert read_case(written(tmp_path, text)).problem(COMM).joint.law == "slip"
+
+
+@pytest.mark.serial
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
@@ -112,6 +127,7 @@ def test_lambda_is_told_by_a_check(tmp_path: Path, capsys: pytest.CaptureFixture
         ('opening = "0.2 mm"', 'opening = "-0.2 mm"', "opening"),
         ('opening = "0.2 mm"', 'opening = "0.2 mm", energy = 3.0', "give either energy or opening"),
         ("joint = {", 'joint = {type = "Glue", ', "Glue"),
+        ("joint = {", 'joint = {softening = "soft", ', "give 'linear' or 'brittle' or 'constant'"),
         ("[run]", '[impact]\ntype = "Inelastic"\n[run]', "leave impact out"),
     ],
 )

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, is_dataclass, replace
 from datetime import date
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, get_args, get_origin
+from typing import Any, Literal, get_args, get_origin
 
 from ....core.arguments import members_of
 from ....core.checks import SHOWN, quote
@@ -150,6 +150,8 @@ def _read_text(value: str, member: Any, spot: Spot, words: Words) -> Node | None
                 f"names '{value}', which does not exist: {suggest_nearest(value, named)}"
             )
         return named[value]
+    if get_origin(member) is Literal:
+        return value if value in get_args(member) else None
     if member in words.short:
         return _read_table({words.short[member]: value}, [member], spot, words)
     if is_path(member):
@@ -293,6 +295,8 @@ def _describe(member: Any, members: Sequence[Any], words: Words) -> list[str]:
         return [f"the name of {GROUP[member.__name__]}"]
     if is_path(member):
         return ["the path of a file"]
+    if get_origin(member) is Literal:
+        return [" or ".join(_show(word) for word in get_args(member))]
     choices = find_choices(member, words)
     if choices:
         table = f"a table with type = one of {', '.join(choices)}"

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from datetime import date
 from inspect import getdoc
 from pathlib import Path
-from typing import Any, get_args, get_origin
+from typing import Any, Literal, get_args, get_origin
 
 from ....core.arguments import members_of
 from ....core.quantities import Between
@@ -178,6 +178,8 @@ class _Schema:
             return [_PLAIN[member]]
         if is_path(member) or member in self._words.groups or member in self._words.short:
             return [_PLAIN[str]]
+        if get_origin(member) is Literal:
+            return [{"enum": list(get_args(member))}]
         if is_list(member):
             kinds = [kind for kind in dict.fromkeys(get_args(member)) if kind is not Ellipsis]
             entries = [self.describe_type(kind) for kind in kinds]
