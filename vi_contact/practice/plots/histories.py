@@ -302,7 +302,9 @@ def save(figure: Any, path: str | Path, title: str | None = None) -> Path:
     if title is not None:
         figure.suptitle(title)
     # One row has nothing to align, and the label of an axis of equal scales would be cut off.
-    places = [axes.get_subplotspec() for axes in figure.axes]
+    # Colour bars are axes without a place in the grid, before matplotlib 3.7 without the question.
+    placed = [axes for axes in figure.axes if hasattr(axes, "get_subplotspec")]
+    places = [axes.get_subplotspec() for axes in placed]
     if len({place.rowspan.start for place in places if place is not None}) > 1:
         figure.align_ylabels()
     return write_picture(figure, path)
