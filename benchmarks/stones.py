@@ -39,7 +39,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np  # noqa: E402
-from mpi4py import MPI  # noqa: E402
+from marching import COMM, Clock  # noqa: E402
 
 import vi_contact as vc  # noqa: E402
 from vi_contact import fem  # noqa: E402
@@ -48,40 +48,10 @@ from vi_contact.meshes.masonry import MasonryMesh  # noqa: E402
 from vi_contact.solvers.friction.hyperstatic import Hyperstatic  # noqa: E402
 from vi_contact.solvers.friction.kept_factor import KeptFactor  # noqa: E402
 
-COMM = MPI.COMM_WORLD
 STONE = vc.LinearElastic(E=1e10, nu=0.2, rho=2400.0)
 SHAKING = vc.Harmonic(amplitude=4.0, frequency=5.0, direction=(1.0, 0.0))
 DT = 1e-3  # s
 PRODUCTS = 20
-
-
-class Clock:
-    """Add up the processor time that is spent in some functions."""
-
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-        self._kept: list[tuple[Any, str, Any]] = []
-
-    def watch(self, owner: Any, method: str, name: str) -> None:
-        """Count what a method of a class takes under a name, less what it calls that is watched."""
-        call = getattr(owner, method)
-        self._kept.append((owner, method, call))
-        self.seconds.setdefault(name, 0.0)
-
-        def timed(*given: Any, **more: Any) -> Any:
-            before = sum(self.seconds.values())
-            start = time.process_time()
-            answer = call(*given, **more)
-            inside = sum(self.seconds.values()) - before
-            self.seconds[name] += time.process_time() - start - inside
-            return answer
-
-        setattr(owner, method, timed)
-
-    def stop(self) -> None:
-        """Leave the methods as they were."""
-        for owner, method, call in self._kept:
-            setattr(owner, method, call)
 
 
 def make_wall(stones: int, cells: tuple[int, int]) -> vc.ContactProblem:

@@ -44,7 +44,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np  # noqa: E402
-from mpi4py import MPI  # noqa: E402
+from marching import COMM, Clock  # noqa: E402
 
 import vi_contact as vc  # noqa: E402
 from vi_contact import fem  # noqa: E402
@@ -54,34 +54,11 @@ from vi_contact.laws import J2, DruckerPrager, MohrCoulomb  # noqa: E402
 from vi_contact.meshes.block import BlockMesh  # noqa: E402
 from vi_contact.solvers.nonlinear import NonlinearSolver  # noqa: E402
 
-COMM = MPI.COMM_WORLD
 Numbers = dict[str, float]
 STEEL = J2(200e9, 0.3, 7800.0, 250e6, isotropic=2e9, kinematic=4e9)
 SOIL = MohrCoulomb(50e6, 0.3, 1900.0, cohesion=10e3, phi=30.0, psi=10.0)
 CONE = DruckerPrager(50e6, 0.3, 1900.0, cohesion=10e3, phi=30.0, psi=10.0)
 MANY = 0.1  # of the points: a step in which so many yield counts as one that yields
-
-
-class Clock:
-    """Add up the processor time that is spent in some functions."""
-
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-
-    def watch(self, owner: Any, method: str, name: str) -> None:
-        """Count what a method of a class takes under a name, less what it calls that is watched."""
-        call = getattr(owner, method)
-        self.seconds.setdefault(name, 0.0)
-
-        def timed(*given: Any, **more: Any) -> Any:
-            before = sum(self.seconds.values())
-            start = time.process_time()
-            answer = call(*given, **more)
-            inside = sum(self.seconds.values()) - before
-            self.seconds[name] += time.process_time() - start - inside
-            return answer
-
-        setattr(owner, method, timed)
 
 
 def throw(law: Any, divisions: tuple[int, ...], velocity: tuple[float, ...]) -> vc.ContactProblem:
@@ -114,21 +91,13 @@ def measure(problem: vc.ContactProblem, dt: float, steps: int) -> Numbers:
         steps: how many.
     """
     clock = Clock()
-    kept = [
-        (owner, method, getattr(owner, method))
-        for owner, method in (
-            (StrainPoints, "strain"),
-            (StrainPoints, "force"),
-            (YieldingForce, "_follow"),
-            (YieldingForce, "_compute_tangents"),
-            (YieldingForce, "residual"),
-            (StrainPoints, "free_matrix"),
-            (NonlinearSolver, "_prepare"),
-        )
-    ]
-    names = ["stress"] * 5 + ["assembly", "factor"]
-    for (owner, method, _), name in zip(kept, names, strict=True):
-        clock.watch(owner, method, name)
+    clock.watch(StrainPoints, "strain", "stress")
+    clock.watch(StrainPoints, "force", "stress")
+    clock.watch(YieldingForce, "_follow", "stress")
+    clock.watch(YieldingForce, "_compute_tangents", "stress")
+    clock.watch(YieldingForce, "residual", "stress")
+    clock.watch(StrainPoints, "free_matrix", "assembly")
+    clock.watch(NonlinearSolver, "_prepare", "factor")
     stepper = vc.Stepper(problem, scheme=vc.Midpoint(), solver=vc.Condensed())
     reports = []
     start = time.process_time()
@@ -137,8 +106,7 @@ def measure(problem: vc.ContactProblem, dt: float, steps: int) -> Numbers:
         stepper.accept(trial)
         reports.append(trial.report)
     seconds = max(COMM.allgather(time.process_time() - start))
-    for owner, method, call in kept:
-        setattr(owner, method, call)
+    clock.stop()
 
     # The ledger is kept afterwards, so that it is not in the time.
     ledger = vc.Energy()
