@@ -17,7 +17,7 @@ from vi_contact import fem, meshes, plots
 from vi_contact.core.errors import InputError, NoEquilibrium, StepFailure
 from vi_contact.core.surfaces import empty_surface
 from vi_contact.laws import J2
-from vi_contact.run.limit_search import find_equilibrium, seek_limit
+from vi_contact.run.limit_search import seek_limit
 from vi_contact.run.static import Equilibria
 
 COMM = MPI.COMM_WORLD
@@ -146,15 +146,14 @@ def test_a_body_that_yields_has_a_limit_too() -> None:
 
 @pytest.mark.serial
 def test_one_function_says_whether_a_load_has_equilibrium() -> None:
-    """What other searches are made of: the state or None, and the halving of steps."""
+    """What searches are made of: a state or none, and the halving of steps."""
     problem, _ = on_the_ground(stack(1), 0.3)
     system = problem.system.with_load((problem.system.inertia(np.array([GRAVITY, 0.0])), abs))
     pushed = vc.ContactProblem(system, problem.surface, friction=problem.friction)
     equilibria = Equilibria(pushed)
     start = vc.static_equilibrium(problem)
-    below = find_equilibrium(equilibria, start, 0.25)
-    assert below is not None and below.certificate <= 1e-9
-    assert find_equilibrium(equilibria, start, 0.35) is None
+    below = equilibria.solve(start, 0.25)
+    assert below.certificate is not None and below.certificate <= 1e-9
     with pytest.raises(NoEquilibrium, match="carry it off along"):
         equilibria.solve(start, 0.35)
     # a search by itself: what is lost at 1.3 from where it is

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 from ..core.errors import NoEquilibrium, StepFailure
 from ..core.step import State
-from .static import Equilibria
 
 # Return the equilibrium at a value of the load, from the state before; raise where there is none.
 Reach = Callable[[State, float], State]
@@ -34,20 +33,6 @@ class LoadPath:
     lost: float
     reason: str
     proven: bool
-
-
-def find_equilibrium(equilibria: Equilibria, old: State, t: float) -> State | None:
-    """Return the equilibrium at time t, or None where none was found. Collective.
-
-    Args:
-        equilibria: of the problem.
-        old: the state before.
-        t: the time [s], or the value at which loads are taken.
-    """
-    try:
-        return equilibria.solve(old, t)
-    except (NoEquilibrium, StepFailure):
-        return None
 
 
 def seek_limit(
