@@ -35,9 +35,9 @@ from ..core.joint_laws import Committed
 from ..core.quantities import RATIO, Between, Finite, NotNegative, Positive, Unit
 from ..core.surfaces import ContactSurface
 from ..core.system import evaluate_history
+from ..core.units import WATER_WEIGHT
 
 QUAKES = ("kept", "follows", "none")
-GAMMA = 9806.65  # weight of fresh water [N/m³]
 Share = Annotated[float, Between(0.0, 1.0), RATIO]
 
 
@@ -71,7 +71,7 @@ class JointWater:
     follows: bool = True
     quake: str = "kept"
     opening: Annotated[float, NotNegative, Unit("m"), "the opening"] = 0.0
-    gamma: Annotated[float, Positive, Unit("N/m³"), "gamma"] = GAMMA
+    gamma: Annotated[float, Positive, Unit("N/m³"), "gamma"] = WATER_WEIGHT
     history: Callable[[float], float] | None = None
 
     def __post_init__(self) -> None:

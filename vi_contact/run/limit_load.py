@@ -29,6 +29,7 @@ from ..core.problem import ContactProblem
 from ..core.state_checks import check_problem_given, initial_state
 from ..core.step import Solver, State
 from ..core.system import Load
+from ..core.units import STANDARD_GRAVITY
 from ..solvers.certified import TOLERANCE
 from .limit_search import LoadPath, seek_limit
 from .method import check_methods
@@ -39,7 +40,7 @@ from .static import Equilibria
 RTOL = 1e-2  # of the bracket, by default
 SHARE = 0.25  # of the ratio of both loads: the first step, by default
 ABOVE = 1e-6  # of the bound, by which a multiplier may exceed it
-GRAVITY = (0.0, -9.80665, 0.0)  # m/s²
+GRAVITY = (0.0, -STANDARD_GRAVITY, 0.0)
 Histories = tuple[tuple[Array, Callable[[float], float]], ...]
 
 

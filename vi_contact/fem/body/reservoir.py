@@ -28,6 +28,7 @@ from ...core.arguments import check_fields
 from ...core.checks import instance, optional, quote
 from ...core.errors import InputError
 from ...core.quantities import RATIO, Finite, NotNegative, Positive, Unit
+from ...core.units import STANDARD_GRAVITY, WATER_WEIGHT
 from .. import compat
 from ..matrices.petsc_rows import aij_of, rows_of
 from ..mesh.group_checks import facets_of
@@ -37,8 +38,6 @@ from .space import FemSpace
 from .water_pressure import find_compliance
 
 MODELS = ("added mass", "incompressible", "at rest")
-GAMMA = 9806.65  # weight of fresh water [N/m³]
-GRAVITY = 9.80665  # m/s²
 WESTERGAARD = 0.875
 QUADRATURE = 8  # degree, for the root of the depth
 ALIKE = 1e-9  # of the depth: nodes of one height
@@ -71,7 +70,7 @@ class Reservoir:
     silt: Annotated[float | None, Finite, Unit("m"), "the silt"] = None
     silt_weight: Annotated[float, NotNegative, Unit("N/m³"), "silt_weight"] = 9000.0
     silt_ratio: Annotated[float, NotNegative, RATIO, "silt_ratio"] = 0.5
-    gamma: Annotated[float, Positive, Unit("N/m³"), "gamma"] = GAMMA
+    gamma: Annotated[float, Positive, Unit("N/m³"), "gamma"] = WATER_WEIGHT
     length: Annotated[float | None, Positive, Unit("m"), "the length"] = None
 
     def __post_init__(self) -> None:
@@ -145,7 +144,7 @@ class Reservoir:
     @property
     def density(self) -> float:
         """Return rho of the water [kg/m³]."""
-        return self.gamma / GRAVITY
+        return self.gamma / STANDARD_GRAVITY
 
     def _find_ends(self, space: FemSpace) -> tuple[float, float]:
         """Return the lowest and the highest height [m] of nodes of the face. Collective."""

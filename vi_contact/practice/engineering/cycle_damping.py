@@ -65,7 +65,8 @@ def loop_damping(
         forces = np.append(y[begin : end + 1], y[begin])
         area = abs(float(np.sum(0.5 * (forces[1:] + forces[:-1]) * np.diff(way))))
         amplitude = 0.5 * float(np.ptp(way))
-        high, low = int(np.argmax(way)), int(np.argmin(way))
+        high = int(np.argmax(way))
+        low = int(np.argmin(way))
         stiffness = float(forces[high] - forces[low]) / (2.0 * amplitude)
         stored = 0.5 * stiffness * amplitude**2
         damping = area / (4.0 * np.pi * stored) if stored > 0.0 else np.nan
@@ -83,7 +84,7 @@ def find_turns(x: Array, least: float) -> list[int]:
         least: the smallest way back that counts.
     """
     turns: list[int] = []
-    way = 0
+    way = 0  # 1 on the way up, -1 on the way down, 0 before the first turn
     high = low = 0
     for row in range(1, len(x)):
         high = row if x[row] >= x[high] else high
@@ -91,11 +92,13 @@ def find_turns(x: Array, least: float) -> list[int]:
         if way >= 0 and x[high] - x[row] >= least > 0.0:
             if way:
                 turns.append(high)
-            way, low = -1, row
+            way = -1
+            low = row
         elif way <= 0 and x[row] - x[low] >= least > 0.0:
             if way:
                 turns.append(low)
-            way, high = 1, row
+            way = 1
+            high = row
     return turns
 
 
@@ -128,7 +131,8 @@ def energy_damping(history: Mapping[str, Array], period: float) -> CycleDamping:
         )
     rows = []
     for k in range(count):
-        begin, end = t[0] + k * period, t[0] + (k + 1) * period
+        begin = t[0] + k * period
+        end = t[0] + (k + 1) * period
         inside = (t >= begin) & (t <= end)
         stored = float(np.ptp(strain[inside]))
         taken = float(np.interp(end, t, lost) - np.interp(begin, t, lost))
