@@ -17,6 +17,7 @@ from .parsing import suggest_nearest
 BY_KEY = ("system", "run")
 WHOLE = (
     "gravity",
+    "reservoir",
     "contact",
     "friction",
     "impact",
