@@ -38,7 +38,8 @@ def describe_values(owner: Any, prefix: str = "") -> Iterator[dict[str, Any]]:
         owner: a dataclass with quantities at its fields.
         prefix: of all names.
     """
-    quantities = read_quantities(type(owner))
+    kind: Any = type(owner)
+    quantities = read_quantities(kind)
     for field in fields(owner):
         value = getattr(owner, field.name)
         name = f"{prefix}{field.name}"
