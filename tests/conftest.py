@@ -157,19 +157,18 @@ def _left_out(item: pytest.Item) -> bool:
 
 
 def _covering(items: list[pytest.Item]) -> set[pytest.Item]:
-    """Of every function, on two ranks so many tests that each value of each parameter occurs, on
-    three, which seldom have a core each, one; of validation, whose parts are tested in the rooms,
-    one on two ranks too, unless ranks are in its name. Their combinations run on one rank, where a
-    law, a scheme or a shape takes the path that it takes on several."""
+    """Of every function one test: the first on two ranks, the last on three. Where ranks are in its
+    name, on two so many that each value of each parameter occurs. All others run on one rank, where
+    a law, a scheme or a shape takes the path that it takes on several."""
     functions: dict[str, list[pytest.Item]] = {}
     for item in items:
         functions.setdefault(item.nodeid.split("[")[0], []).append(item)
-    if SIZE > 2:  # the last: other values than two ranks begin with
+    if SIZE > 2:
         return {ones[-1] for ones in functions.values()}
     kept: set[pytest.Item] = set()
     for ones in functions.values():
-        if "validation" in ones[0].path.parts and "ranks" not in ones[0].name.split("[")[0]:
-            kept.add(ones[-1])
+        if "ranks" not in ones[0].name.split("[")[0]:
+            kept.add(ones[0])
             continue
         alike = set.intersection(*map(_parameters, ones)) if len(ones) > 1 else set()
         seen: set[tuple[str, int]] = set()

@@ -107,7 +107,7 @@ def bond(
     return system, ContactProblem(system, surface, friction=vc.Coulomb(MU))
 
 
-@pytest.mark.two_ranks
+@pytest.mark.serial  # ranks: the shaken wall, of the same stones
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("unlike", [False, True], ids=["nodes", "mortar"])
 def test_stones_in_running_bond_press_alike(d, unlike):

@@ -195,6 +195,7 @@ def test_a_restart_is_the_straight_run(comm: Any, shared_tmp: Any, quake: str) -
         assert again[name][-1] == pytest.approx(straight[name][-1], abs=1e-10 * scale)
 
 
+@pytest.mark.serial  # ranks: the restart has both
 def test_an_earthquake_keeps_water_or_none(comm: Any) -> None:
     """kept: p B/2 all the time; none: nothing in what has opened, so less."""
     uplift = {}

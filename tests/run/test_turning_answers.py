@@ -103,6 +103,7 @@ def test_a_block_is_pressed_by_four_fifths(comm: Any) -> None:
         assert force == pytest.approx(law.shear_modulus * (1.0 / stretch - stretch), rel=1e-9)
 
 
+@pytest.mark.serial  # ranks: test_ranks_agree
 @pytest.mark.slow
 def test_a_barrel_is_pressed_by_four_fifths(comm: Any) -> None:
     """A block between rough planes in a medium that brakes it: it bulges, stays symmetric, and the
@@ -130,6 +131,7 @@ def test_a_barrel_is_pressed_by_four_fifths(comm: Any) -> None:
     assert 1.0 + 2.0 * right[0] > 1.6358
 
 
+@pytest.mark.serial  # ranks: test_ranks_agree
 @pytest.mark.slow
 @pytest.mark.parametrize(("width", "off"), [(0.25, 0.01), (0.5, 0.06)])
 def test_a_landing_loses_the_rate_of_housner(comm: Any, width: float, off: float) -> None:
@@ -153,6 +155,7 @@ def test_a_landing_loses_the_rate_of_housner(comm: Any, width: float, off: float
     assert sqrt(after / before) == pytest.approx(1.0 - 1.5 * sin(alpha) ** 2, rel=off)
 
 
+@pytest.mark.serial  # ranks: test_ranks_agree
 @pytest.mark.slow
 @pytest.mark.parametrize(("strength", "falls"), [(1.95, False), (2.15, True)])
 def test_a_pulse_overturns_a_column_as_the_rigid_one(
