@@ -24,6 +24,7 @@ STRING = vc.SaintVenantKirchhoff(E=1e6, nu=0.0, rho=1000.0)
 OMEGA = 8.0  # rad/s, of the spinning bar
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("law", [vc.SaintVenantKirchhoff, vc.NeoHookean])
 def test_steps_are_of_order_two(comm: Any, law: Any) -> None:
     """Differences of runs with dt, dt/2 and dt/4 fall by four, while a block spins and swings."""
@@ -56,6 +57,7 @@ def stretch_bar() -> Any:
     return lambda X: np.sign(X) * answer.sol(np.abs(X))[0]
 
 
+@pytest.mark.long
 @pytest.mark.two_ranks
 def test_a_spinning_bar_is_stretched_by_its_spin(comm: Any) -> None:
     """Its tip moves out as far as that of the exact bar, 21.07 mm, and the error falls by four with
@@ -169,6 +171,7 @@ def test_a_pulse_overturns_a_column_as_the_rigid_one(
         assert tilt == pytest.approx(rigid, rel=0.2)
 
 
+@pytest.mark.long
 def test_ranks_agree(comm: Any) -> None:
     """A block lands on a rough corner: the places of all nodes are those of one rank."""
     from mpi4py import MPI
