@@ -157,17 +157,20 @@ def _left_out(item: pytest.Item) -> bool:
 
 
 def _covering(items: list[pytest.Item]) -> set[pytest.Item]:
-    """Of every function one test: the first on two ranks, the last on three. Where ranks are in its
-    name, on two so many that each value of each parameter occurs. All others run on one rank, where
-    a law, a scheme or a shape takes the path that it takes on several."""
+    """Of every function one test: the first on two ranks, the last on three, where long ones are
+    left out too. Where ranks are in its name or that of its file, on two so many that each value of
+    each parameter occurs, and on three also what is long. All others run on one rank, where a law,
+    a scheme or a shape takes the path that it takes on several."""
     functions: dict[str, list[pytest.Item]] = {}
     for item in items:
         functions.setdefault(item.nodeid.split("[")[0], []).append(item)
-    if SIZE > 2:
-        return {ones[-1] for ones in functions.values()}
     kept: set[pytest.Item] = set()
-    for ones in functions.values():
-        if "ranks" not in ones[0].name.split("[")[0]:
+    for name, ones in functions.items():
+        if SIZE > 2:
+            if "ranks" in name or not ones[-1].get_closest_marker("long"):
+                kept.add(ones[-1])
+            continue
+        if "ranks" not in name:
             kept.add(ones[0])
             continue
         alike = set.intersection(*map(_parameters, ones)) if len(ones) > 1 else set()
