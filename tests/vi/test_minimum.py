@@ -81,6 +81,7 @@ def test_a_wall_between_two_wells(comm: Any, d: int) -> None:
         assert np.max(np.abs(u.x.array - exact.x.array)) <= 0.01
 
 
+@pytest.mark.long
 def test_a_convex_energy_has_the_answer_of_its_form(comm: Any) -> None:
     """The membrane over a step: F and the energy, one answer and one set of multipliers."""
     V = space(square(comm, 12), ("Lagrange", 1))
