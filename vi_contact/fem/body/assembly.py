@@ -238,6 +238,9 @@ def assemble(
     )
     if bcs:
         refuse_contradictions(space)
+    if reservoir is not None:
+        reservoir.refuse_beside(tied=bool(conditions.tied), placed=missing is not None)
+        space.water = reservoir.fill(space, section.thickness)
     rigid = np.column_stack([space.restrict(motion) for motion in space.translations])
 
     # the body: weak forms of its materials or of the user, absorbing boundaries, loads
@@ -248,6 +251,11 @@ def assemble(
         forms, materials, conditions, integration=integration, stress=initial_stress
     )
     body = make_body(space, materials=materials, section=section, damping=damping)
+    if space.water is not None and body.internal is not None:
+        raise InputError(
+            f"Reservoir: model 'acoustic' is before linear bodies, and {body.nonlinear} is not "
+            "linear: give 'incompressible' or 'added mass'"
+        )
     body.boundaries = conditions.dashpots
     check_ratios(
         damping,
@@ -271,7 +279,7 @@ def assemble(
         absorbers,
         algebra,
         base_inertia=base_inertia,
-        water=None if reservoir is None else reservoir.assemble_mass(space, section.thickness),
+        water=_weigh_water(space, reservoir, section.thickness),
     )
     M = reduced.M
     base_mass = None
@@ -425,7 +433,25 @@ def _reduce(
     if water is not None:
         mass = _add_water(mass, water, momenta, elimination, directions)
     M, inertial = _eliminate(mass, elimination, algebra, motions[2])
+    if space.water is not None:
+        M, C, K = (
+            space.water.join(name, part, algebra)
+            for name, part in (("M", M), ("C", C), ("K", K))
+        )
+        if momenta is not None:
+            space.water.add_momenta(momenta)
+        if space.moves:
+            inertial = (*inertial, space.water.make_load())
     return _Reduced(M, C, K, elastic, viscous, inertial, momenta)
+
+
+def _weigh_water(space: FemSpace, reservoir: Reservoir | None, thickness: float) -> Any:
+    """Return the mass of the water on the components of the face (PETSc), or None. Collective."""
+    if reservoir is None:
+        return None
+    if space.water is not None:
+        return space.water.mass_of_face()
+    return reservoir.assemble_mass(space, thickness)
 
 
 def _add_water(
