@@ -81,6 +81,14 @@ class AcousticWater:
         mine = x[len(x) - count :] if self.here else np.zeros(count)
         return self._space.comm.sum(mine)
 
+    def find_force(self, pressure: Array) -> Array:
+        """Return the force (d,) [N] of pressures (b,) [Pa] of nodes below the level on the body."""
+        nodal = self.face.S[:, self.face.below] @ pressure
+        # rows of all components begin with a node, and n of S points into the water
+        return -np.bincount(
+            self.face.touched % self._space.dimension, nodal, self._space.dimension
+        )
+
     def put(self, values: Array) -> Array:
         """Return a vector (n,) with these values (w,) of the water, and zero elsewhere."""
         vector = np.zeros(len(self._space.ids))
