@@ -92,7 +92,7 @@ def test_errors_of_the_mesh_fall_with_its_square() -> None:
 
 @pytest.mark.parametrize("alpha", [1.0, 0.8, 0.5])
 def test_waves_of_a_column_come_back_alpha_times_as_large(alpha: float) -> None:
-    """A wave takes 2 h/c from the level to the bottom and back: period 4 h/c, rate c ln alpha/2h."""
+    """A wave takes 2 h/c to the bottom and back: period 4 h/c, rate c ln alpha/2h."""
     water = fill(alpha, 6.0, open_end=False)
     n = water.count
     nothing, one = np.zeros((n, n)), np.eye(n)
@@ -130,9 +130,7 @@ def test_periods_of_a_dam(comm: Any) -> None:
     assert periods["fast"] == pytest.approx(periods["incompressible"], rel=3e-3)
 
 
-def pose(
-    comm: Any, size: tuple[float, float, float], cells: tuple[int, int], **others: Any
-) -> Any:
+def pose(comm: Any, size: tuple[float, float, float], cells: tuple[int, int], **others: Any) -> Any:
     """A dam on a base with friction, its face wet to 0.9 of its height; shaken by a sine."""
     frequency = others.pop("frequency", 2.0)
     amplitude = others.pop("amplitude", 3.0)
@@ -244,7 +242,7 @@ def test_any_number_of_ranks(comm: Any) -> None:
 
 
 def test_water_that_does_not_weigh(comm: Any) -> None:
-    """M r of a vertical acceleration is that of the dry dam, on a slope too; alpha M has no water."""
+    """M r of a vertical acceleration is that of the dry dam, on a slope too."""
     systems = []
     for water in ({"level": 36.0, "model": "acoustic"}, None):
         damping = vc.Rayleigh(0.5, 0.0)
@@ -255,6 +253,27 @@ def test_water_that_does_not_weigh(comm: Any) -> None:
     assert systems[0].K.rows == systems[1].K.rows + (
         systems[0].space.water.equations.count if comm.rank == comm.size - 1 else 0
     )
+
+
+@pytest.mark.serial
+def test_what_does_not_go_with_the_water_is_refused(comm: Any) -> None:
+    """Bodies that yield, bodies that come and go, and space."""
+    import dolfinx
+
+    water = {"level": 36.0, "model": "acoustic"}
+    with pytest.raises(InputError, match="come and go"):
+        stand(comm, *SMALL, water, absent=())
+    mesh = dolfinx.mesh.create_rectangle(comm, [[0.0, 0.0], [20.0, 40.0]], [2, 4])
+    face = fem.Facets.where("face", mesh, lambda x: np.isclose(x[0], 0.0))
+    base = fem.Prescribed(fem.Facets.where("base", mesh, lambda x: np.isclose(x[1], 0.0)))
+    soft = laws.J2(E=25e9, nu=0.2, rho=2400.0, yield_stress=1e6)
+    with pytest.raises(InputError, match="before linear bodies"):
+        fem.assemble(mesh, soft, prescribed=base, reservoir=fem.Reservoir(face, **water))
+    box = dolfinx.mesh.create_box(comm, [[0.0] * 3, [20.0, 10.0, 40.0]], [1, 1, 2])
+    face = fem.Facets.where("face", box, lambda x: np.isclose(x[0], 0.0))
+    stone = vc.LinearElastic(E=25e9, nu=0.2, rho=2400.0)
+    with pytest.raises(InputError, match="for the plane"):
+        fem.assemble(box, stone, reservoir=fem.Reservoir(face, **water))
 
 
 @pytest.mark.serial

@@ -29,7 +29,9 @@ def lowest_frequency(
 
     K is the reference stiffness of a body that is not linear.
 
-    Outlets of a reservoir are closed. By inverse iteration with one factorisation of K. The start vector is the static answer to a
+    Outlets of a reservoir are closed.
+
+    By inverse iteration with one factorisation of K. The start vector is the static answer to a
     uniform acceleration in all directions: deterministic, and not orthogonal to the first mode of
     structures that a base motion can excite.
 

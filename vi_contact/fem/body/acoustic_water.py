@@ -16,7 +16,7 @@ come
 
 and with Kp = ∫ grad·grad, Mp = ∫ psi psi/c² and the widths s of the outlets the energies are
 
-    kinetic ½ rho w'ᵀ Kp⁻¹ w',   of compression ½ rho zᵀ Mp⁻¹ z,   loss rho Σ s²/(s q) b'²
+    kinetic ½ rho w'ᵀ Kp⁻¹ w',   of compression ½ rho zᵀ Mp⁻¹ z,   loss rho Σ s b'²/q a second
 
 with E = diag(s). Their equations of motion are those above: p = rho Kp⁻¹ w''. M, C and K are
 **symmetric and positive**. So the water is a body like others: every scheme marches it, A of a step
@@ -158,7 +158,8 @@ def find_water(x: Array, y: Array, side: float, data: WaterData) -> WaterEquatio
     inner[modes:, :modes] = inner[:modes, modes:].T
     damping = np.zeros(answers.shape[1])
     damping[modes:] = data.density * widths**2 / leaks[outlets]
-    springs = np.concatenate([data.density * scale**2, SLACK * data.speed / depth * damping[modes:]])
+    springs = SLACK * data.speed / depth * damping
+    springs[:modes] = data.density * scale**2
     at_end = np.zeros(answers.shape[1])
     at_end[modes:] = of_end[outlets] / leaks[outlets]
     return WaterEquations(

@@ -60,7 +60,7 @@ from .initial_strains import InitialStrain, InitialStrains
 from .linear_forms import AnyLoad, LinearForm, Loads
 from .loads import BodyForce, Prescribed, Traction, evaluate
 from .own_forms import Forms, OwnForms
-from .reservoir import Reservoir, list_pressures
+from .reservoir import Reservoir, add_water, list_pressures
 from .space import FemSpace, translations
 from .ties import Tied
 from .turning_forms import TurningForms
@@ -227,20 +227,21 @@ def assemble(
     if bcs:
         supports += [values.support(nodes.owned) for values in read_values(mesh, V, bcs)]
     supports += [] if missing is None else hold_absent(comm, V, nodes, missing)
-    space = FemSpace(
-        V,
-        nodes,
-        supports,
-        conditions.tied,
-        degree=degree,
-        quadrature_degree=quadrature_degree,
-        absent=missing,
+    space = add_water(
+        reservoir,
+        FemSpace(
+            V,
+            nodes,
+            supports,
+            conditions.tied,
+            degree=degree,
+            quadrature_degree=quadrature_degree,
+            absent=missing,
+        ),
+        section.thickness,
     )
     if bcs:
         refuse_contradictions(space)
-    if reservoir is not None:
-        reservoir.refuse_beside(tied=bool(conditions.tied), placed=missing is not None)
-        space.water = reservoir.fill(space, section.thickness)
     rigid = np.column_stack([space.restrict(motion) for motion in space.translations])
 
     # the body: weak forms of its materials or of the user, absorbing boundaries, loads
@@ -251,11 +252,6 @@ def assemble(
         forms, materials, conditions, integration=integration, stress=initial_stress
     )
     body = make_body(space, materials=materials, section=section, damping=damping)
-    if space.water is not None and body.internal is not None:
-        raise InputError(
-            f"Reservoir: model 'acoustic' is before linear bodies, and {body.nonlinear} is not "
-            "linear: give 'incompressible' or 'added mass'"
-        )
     body.boundaries = conditions.dashpots
     check_ratios(
         damping,
@@ -360,8 +356,13 @@ def _gather_companions(
         acting: loads of absorbing boundaries.
 
     Raises:
-        InputError: there are such motions beside a body that is not linear.
+        InputError: there are such motions, or compressible water, beside a body that is not linear.
     """
+    if body.space.water is not None and body.internal is not None:
+        raise InputError(
+            f"Reservoir: model 'acoustic' is before linear bodies, and {body.nonlinear} is not "
+            "linear: give 'incompressible' or 'added mass'"
+        )
     companions = [companion for part in (*prescribed, *acting) for companion in part.companions]
     if companions and body.internal is not None:
         raise InputError(
@@ -435,8 +436,7 @@ def _reduce(
     M, inertial = _eliminate(mass, elimination, algebra, motions[2])
     if space.water is not None:
         M, C, K = (
-            space.water.join(name, part, algebra)
-            for name, part in (("M", M), ("C", C), ("K", K))
+            space.water.join(name, part, algebra) for name, part in (("M", M), ("C", C), ("K", K))
         )
         if momenta is not None:
             space.water.add_momenta(momenta)

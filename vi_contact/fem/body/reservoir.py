@@ -24,7 +24,7 @@ from typing import Annotated, Any
 import numpy as np
 import ufl
 
-from ...core.algebra import Array, largest
+from ...core.algebra import largest
 from ...core.arguments import check_fields
 from ...core.checks import instance, optional, quote
 from ...core.errors import InputError
@@ -130,22 +130,6 @@ class Reservoir:
                 f"{quote(self.model)}: leave it out"
             )
 
-    def refuse_beside(self, *, tied: bool, placed: bool) -> None:
-        """Raise InputError for what does not go with water that has unknowns of its own.
-
-        Args:
-            tied: whether sides of the body are tied.
-            placed: whether parts of it come and go by stages.
-        """
-        if self.model != "acoustic":
-            return
-        for found, what in ((tied, "tied sides"), (placed, "bodies that come and go by stages")):
-            if found:
-                raise InputError(
-                    f"Reservoir: model 'acoustic' does not go with {what}: give 'incompressible' "
-                    "or 'added mass'"
-                )
-
     def make_loads(self) -> list[Pressure]:
         """Return the pressures at rest: of water, of silt and of the tail water."""
         loads = [Pressure(self.face, self._press_at(self.level, self.gamma))]
@@ -239,15 +223,24 @@ class Reservoir:
             )
         return WetFace(space, self.face, self.level, thickness)
 
-    def fill(self, space: FemSpace, thickness: float) -> AcousticWater | None:
-        """Return compressible water with its unknowns, None for other models. Collective.
+    def make_water(self, space: FemSpace, thickness: float) -> AcousticWater:
+        """Return compressible water, whose unknowns are added to those of the body. Collective.
 
         Args:
-            space: the body's unknowns, which get those of the water.
+            space: the body's unknowns.
             thickness: of the section [m].
+
+        Raises:
+            InputError: tied sides, bodies that come and go by stages, and what ``assemble_mass``
+                refuses.
         """
-        if self.model != "acoustic":
-            return None
+        parts = {"tied sides": space.ties, "bodies that come and go by stages": space.absent}
+        for what, found in parts.items():
+            if found is not None and len(found):
+                raise InputError(
+                    f"Reservoir: model 'acoustic' does not go with {what}: give 'incompressible' "
+                    "or 'added mass'"
+                )
         self._find_ends(space)
         wet = self._find_wet_face(space, thickness)
         data = WaterData(
@@ -260,6 +253,19 @@ class Reservoir:
             thickness=thickness,
         )
         return AcousticWater(space, wet, data)
+
+
+def add_water(reservoir: Reservoir | None, space: FemSpace, thickness: float) -> FemSpace:
+    """Return the unknowns of a body, with those of compressible water if there is some. Collective.
+
+    Args:
+        reservoir: the reservoir, or None.
+        space: the body's unknowns, which are changed.
+        thickness: of the section [m].
+    """
+    if reservoir is not None and reservoir.model == "acoustic":
+        space.water = reservoir.make_water(space, thickness)
+    return space
 
 
 def list_pressures(reservoir: Any) -> list[Pressure]:

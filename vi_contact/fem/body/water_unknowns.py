@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ...core.algebra import Array, Mask
+from ...core.algebra import Array, Indices, Mask
 from ..matrices.petsc_algebra import PetscAlgebra, PetscMatrix
 from ..matrices.petsc_rows import aij_of, rows_of
 from .acoustic_water import WaterData, WaterEquations, find_water
@@ -85,9 +85,8 @@ class AcousticWater:
         """Return the force (d,) [N] of pressures (b,) [Pa] of nodes below the level on the body."""
         nodal = self.face.S[:, self.face.below] @ pressure
         # rows of all components begin with a node, and n of S points into the water
-        return -np.bincount(
-            self.face.touched % self._space.dimension, nodal, self._space.dimension
-        )
+        component = self.face.touched % self._space.dimension
+        return np.array([-nodal[component == c].sum() for c in range(self._space.dimension)])
 
     def put(self, values: Array) -> Array:
         """Return a vector (n,) with these values (w,) of the water, and zero elsewhere."""
@@ -164,7 +163,7 @@ class AcousticWater:
         columns = np.tile(numbers[moves], w)
         return entries + self._rows(rows, columns, coupling[moves].T.ravel())
 
-    def _rows(self, rows: Array, columns: Array, values: Array) -> sp.csr_matrix:
+    def _rows(self, rows: Indices, columns: Indices, values: Array) -> sp.csr_matrix:
         """Return owned rows with these entries."""
         shape = (len(self._space.ids), self._start + self.equations.count)
         return sp.csr_matrix((values, (rows, columns)), shape=shape)

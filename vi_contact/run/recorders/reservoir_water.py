@@ -96,7 +96,8 @@ class ReservoirWater:
         # p = rho Kp⁻¹ w'', with the accelerations in space
         t0, t1 = report.old.t, report.new.t
         nodal = self._space.expand(self._problem.cartesian(balance.a), 0.5 * (t0 + t1), 2)
-        ground = 0.5 * sum(self._problem.ground_acceleration(t) for t in (t0, t1))
+        ground: Array = self._problem.ground_acceleration(t0)
+        ground = 0.5 * (ground + self._problem.ground_acceleration(t1))
         ground[-1] = 0.0  # water does not rise with the ground
         volumes = water.find_volumes(nodal + ground)
         pressure = equations.of_face @ volumes
