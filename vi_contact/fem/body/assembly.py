@@ -60,7 +60,7 @@ from .initial_strains import InitialStrain, InitialStrains
 from .linear_forms import AnyLoad, LinearForm, Loads
 from .loads import BodyForce, Prescribed, Traction, evaluate
 from .own_forms import Forms, OwnForms
-from .reservoir import Reservoir, list_pressures
+from .reservoir import Reservoir, add_water, list_pressures
 from .space import FemSpace, translations
 from .ties import Tied
 from .turning_forms import TurningForms
@@ -222,6 +222,7 @@ def assemble(
         degree=degree,
         quadrature_degree=quadrature_degree,
     )
+    add_water(reservoir, space, section.thickness)
     rigid = np.column_stack([space.restrict(motion) for motion in space.translations])
 
     # the body: weak forms of its materials or of the user, absorbing boundaries, loads
@@ -255,7 +256,7 @@ def assemble(
         absorbers,
         algebra,
         base_inertia=base_inertia,
-        water=None if reservoir is None else reservoir.assemble_mass(space, section.thickness),
+        water=_weigh_water(space, reservoir, section.thickness),
     )
     M = reduced.M
     base_mass = None
@@ -399,8 +400,13 @@ def _gather_companions(
         acting: loads of absorbing boundaries.
 
     Raises:
-        InputError: there are such motions beside a body that is not linear.
+        InputError: there are such motions, or compressible water, beside a body that is not linear.
     """
+    if body.space.water is not None and body.internal is not None:
+        raise InputError(
+            f"Reservoir: model 'acoustic' is before linear bodies, and {body.nonlinear} is not "
+            "linear: give 'incompressible' or 'added mass'"
+        )
     companions = [companion for part in (*prescribed, *acting) for companion in part.companions]
     if companions and body.internal is not None:
         raise InputError(
@@ -472,7 +478,24 @@ def _reduce(
     if water is not None:
         mass = _add_water(mass, water, momenta, elimination, directions)
     M, inertial = _eliminate(mass, elimination, algebra, motions[2])
+    if space.water is not None:
+        M, C, K = (
+            space.water.join(name, part, algebra) for name, part in (("M", M), ("C", C), ("K", K))
+        )
+        if momenta is not None:
+            space.water.add_momenta(momenta)
+        if space.moves:
+            inertial = (*inertial, space.water.make_load())
     return _Reduced(M, C, K, elastic, viscous, inertial, momenta)
+
+
+def _weigh_water(space: FemSpace, reservoir: Reservoir | None, thickness: float) -> Any:
+    """Return the mass of the water on the components of the face (PETSc), or None. Collective."""
+    if reservoir is None:
+        return None
+    if space.water is not None:
+        return space.water.mass_of_face()
+    return reservoir.assemble_mass(space, thickness)
 
 
 def _add_water(
