@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 from mpi4py import MPI
 
 from vi_contact import InputError
+from vi_contact.practice.plots.deformed import read_frames
 from vi_contact.practice.studies import read_case
 
 GEO = """
@@ -163,3 +165,29 @@ def test_wrong_lifts_are_refused_in_a_sentence(
         case.problem(MPI.COMM_SELF)
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("kind", ["XDMF", "VTKHDF"])
+def test_frames_have_the_bodies_that_are_there(tmp_path: Path, kind: str) -> None:
+    """Ground alone, with fill, with the block, and without it again: the area of the cells of each
+    stage, every node is of a cell, and the picture of the model has the same bodies."""
+    text = CASE.replace("steps = 12", "steps = 2").replace(
+        "[[excitation]]", f'[fields]\ntype = "{kind}"\nevery = 2\n[[excitation]]'
+    )
+    out = tmp_path / "out"
+    read_case(write(tmp_path, text)).run(MPI.COMM_SELF, progress=False, out=out)
+    areas = {"stages/1_ground": 2.0, "stages/2_fill": 4.0, "stages/4_shock": 6.0, ".": 4.0}
+    for folder, area in areas.items():
+        frames = read_frames(out / folder)
+        corners = frames.points[frames.cells]
+        sides = corners[:, 1:] - corners[:, :1]
+        assert np.abs(np.linalg.det(sides)).sum() / 2.0 == pytest.approx(area, rel=1e-12)
+        assert frames.points[:, 1].max() == pytest.approx(area / 2.0)
+        _, u, stress = frames.at(0.0)
+        assert u.shape == frames.points.shape
+        assert np.all(stress > 0.0)
+        model = json.loads((out / folder / "model.json").read_text())
+        drawn = [np.array(part["lines"]) for part in model["outline"] if part["lines"]]
+        lines = np.concatenate(drawn)
+        assert lines[:, [1, 3]].max() == pytest.approx(area / 2.0)
