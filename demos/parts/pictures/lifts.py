@@ -67,5 +67,5 @@ def plot_slips(slips: Mapping[tuple[str, float], Any], path: Path) -> Path:
             axis.plot(t, 1e3 * exact, "--", color=colour, lw=1.0, label=f"Newmark, {label}")
         axis.set_xlabel("time [s]")
         axis.set_ylabel("slip [mm]")
-        axis.legend(fontsize=8, frameon=False)
+        axis.legend(fontsize=8, frameon=False, ncol=2, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     return save(figure, path)
