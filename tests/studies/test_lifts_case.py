@@ -191,6 +191,10 @@ def test_frames_have_the_bodies_that_are_there(tmp_path: Path, kind: str) -> Non
         drawn = [np.array(part["lines"]) for part in model["outline"] if part["lines"]]
         lines = np.concatenate(drawn)
         assert lines[:, [1, 3]].max() == pytest.approx(area / 2.0)
+    # what is placed touches what has settled, and a linear body is called so
+    model = json.loads((out / "stages" / "3_block" / "model.json").read_text())
+    assert np.abs(model["contact"][0]["gaps"]).max() <= 1e-12
+    assert [body["material"]["type"] for body in model["bodies"]][-1] == "LinearElastic"
 
 
 @pytest.mark.serial

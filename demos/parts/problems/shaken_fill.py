@@ -1,7 +1,7 @@
 """Run the case of the backfilled wall under another motion, and read what is left of it.
 
 The case is demos/cases/backfilled_wall.toml: wall, ground and three lifts. Its excitation is
-replaced, and fields and the sliding of the base are written as well.
+replaced, and fields are written as well.
 """
 
 from __future__ import annotations
@@ -20,17 +20,6 @@ from vi_contact.practice.studies import read_case
 
 CASES = Path(__file__).parents[2] / "cases"
 NAME = "backfilled_wall"
-MORE = """
-[[record]]
-type = "Resultants"
-name = "base"
-part = "base"
-centre = [2.0, 0.0]
-
-[[record]]
-type = "Probe"
-points = {top = [1.0, 6.0]}
-"""
 
 
 def write_case(folder: Path, record: Record, every: int) -> Path:
@@ -59,7 +48,7 @@ every = {every}
 
 """
     path = folder / f"{NAME}.toml"
-    path.write_text(head + motion + rest + MORE)
+    path.write_text(head + motion + rest)
     (folder / f"{NAME}.geo").write_text((CASES / f"{NAME}.geo").read_text())
     write_at2(record, folder / "motion.at2")
     return path
