@@ -17,15 +17,15 @@ pytestmark = pytest.mark.serial
 R, HEIGHT, PERIOD = 1e-3, 4.0, 4.0
 STRAINS = R * np.geomspace(1e-2, 30.0, 30)
 SOIL = Iwan(2.6e7, 0.3, 2000.0, list(zip(STRAINS, 1.0 / (1.0 + STRAINS / R), strict=True)))
-PLACES = np.concatenate([[0.0], STRAINS])
-STRESSES = np.concatenate([[0.0], SOIL.shear_modulus * STRAINS / (1.0 + STRAINS / R)])
+GAMMA = np.concatenate([[0.0], STRAINS])
+TAU = np.concatenate([[0.0], SOIL.shear_modulus * STRAINS / (1.0 + STRAINS / R)])
 
 
 def find_damping(amplitude: float) -> float:
     """(2/pi) (2 ∫ tau dgamma/(tau_a a) - 1) of the polygon up to an amplitude."""
-    inside = PLACES < amplitude
-    x = np.append(PLACES[inside], amplitude)
-    y = np.append(STRESSES[inside], np.interp(amplitude, PLACES, STRESSES))
+    inside = amplitude > GAMMA
+    x = np.append(GAMMA[inside], amplitude)
+    y = np.append(TAU[inside], np.interp(amplitude, GAMMA, TAU))
     area = np.sum(0.5 * np.diff(x) * (y[1:] + y[:-1]))
     return float(2.0 / np.pi * (2.0 * area / (y[-1] * amplitude) - 1.0))
 
@@ -70,11 +70,11 @@ def test_loops_of_a_column_in_time_are_masings(comm: Any) -> None:
     # The turns of the largest loop, and the branch between them.
     high = int(np.argmax(gamma))
     low = high + int(np.argmin(gamma[high : high + 50]))
-    assert tau[:5] == pytest.approx(np.interp(gamma[:5], PLACES, STRESSES), rel=1e-9, abs=1e-6)
-    assert tau[high] == pytest.approx(np.interp(gamma[high], PLACES, STRESSES), rel=1e-9)
+    assert tau[:5] == pytest.approx(np.interp(gamma[:5], GAMMA, TAU), rel=1e-9, abs=1e-6)
+    assert tau[high] == pytest.approx(np.interp(gamma[high], GAMMA, TAU), rel=1e-9)
     branch = slice(high, low + 1)
     way = 0.5 * (gamma[high] - gamma[branch])
-    twice = tau[high] - 2.0 * np.interp(way, PLACES, STRESSES)
+    twice = tau[high] - 2.0 * np.interp(way, GAMMA, TAU)
     size = tau[high]
     beyond = -gamma[branch] > gamma[high]  # the polygon of first loading takes over there
     assert np.count_nonzero(~beyond) >= 15
