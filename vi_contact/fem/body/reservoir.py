@@ -142,6 +142,17 @@ class Reservoir:
             loads.append(Pressure(self.tail_face, self._press_at(self.tail, self.gamma)))
         return loads
 
+    def name_loads(self) -> list[str]:
+        """Return what the loads of ``make_loads`` are, such as "silt on 'face'"."""
+        names = [f"water on '{self.face.name}'"]
+        if self.floor is not None:
+            names.append(f"water on '{self.floor.name}'")
+        if self.silt is not None:
+            names.append(f"silt on '{self.face.name}'")
+        if self.tail_face is not None:
+            names.append(f"tail water on '{self.tail_face.name}'")
+        return names
+
     def _press_at(self, level: float, weight: float) -> Any:
         """Return the function (points, t) -> weight max(level - y, 0) [Pa]."""
         return lambda points, t: weight * np.maximum(level - points[:, -1], 0.0)
