@@ -134,7 +134,7 @@ def test_a_stage_has_its_own_level(shared_tmp: Path) -> None:
         ('level = "9 m"\nmodel', 'level = "9 kN"\nmodel', r"\[reservoir\] level"),
         ('level = "9 m"\nmodel', 'level = "19 m"\nmodel', r"Reservoir: the level 19 m is above"),
         ('silt = "2 m"', 'slit = "2 m"', r"unknown key 'slit' for Reservoir: did you mean silt"),
-        ('face = "left"\nlevel = "9', 'face = "lefft"\nlevel = "9', r"\[reservoir\] face is 'lefft'"),
+        ('face = "left"', 'face = "lefft"', r"\[reservoir\] face is 'lefft'"),
     ],
 )
 def test_wrong_reservoirs_are_refused_in_words_of_the_file(

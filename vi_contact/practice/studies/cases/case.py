@@ -103,9 +103,7 @@ TABLES: dict[str, Any] = {
     "beam": BeamBody,
     "particle": ParticleBody,
     "material": Mapping[str, LinearElastic | Orthotropic | Heterogeneous | YieldingMaterial],
-    "system": make_callee(
-        assemble, keys={"clamped": "fixed"}, supplied=(*SUPPLIED, "reservoir")
-    ),
+    "system": make_callee(assemble, keys={"clamped": "fixed"}, supplied=(*SUPPLIED, "reservoir")),
     "reservoir": make_callee(Reservoir),
     "strain_compatible": CALL,
     "contact": ContactSurface | Sequence[ContactSurface],
