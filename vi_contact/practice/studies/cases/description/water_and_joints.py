@@ -8,6 +8,7 @@ from dataclasses import fields, is_dataclass
 from typing import Any
 
 from .....core.quantities import read_quantities
+from .....fem.body.reservoir import OF_ACOUSTIC
 from ..bodies import BODY_TABLES
 from ..table_calls import build
 from .pen import Model, Pen, Row, list_objects, say
@@ -25,7 +26,12 @@ def describe_reservoir(case: Any, tags: Mapping[str, Any]) -> list[dict[str, Any
     """
     if "reservoir" not in case.nodes or any(name in case.nodes for name in BODY_TABLES):
         return []
-    return list(describe_values(build(case.nodes["reservoir"], {"tags": tags})))
+    reservoir = build(case.nodes["reservoir"], {"tags": tags})
+    # what it does not read is left out
+    silent = set() if reservoir.model == "acoustic" else set(OF_ACOUSTIC)
+    if reservoir.silt is None:
+        silent |= {"silt_weight", "silt_ratio"}
+    return [entry for entry in describe_values(reservoir) if entry["name"] not in silent]
 
 
 def describe_values(owner: Any, prefix: str = "") -> Iterator[dict[str, Any]]:
