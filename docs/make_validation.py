@@ -103,7 +103,7 @@ FOOT = """## Not in the book yet
 - **SSNP142 of code_aster** (a joint of a dam): its joint is a penalty, and its geometry is not
   at hand.
 - **Example 8.8 of Kramer and Stewart**, and the periods of Pine Flat dam with its reservoir: the
-  second needs the added mass of water.
+  second is not made yet.
 - **Statistics of rocking blocks, and pounding of buildings**: their tables are not public, and
   have to be fetched by hand.
 """
