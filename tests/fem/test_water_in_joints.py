@@ -246,5 +246,8 @@ def test_bad_water_is_refused_in_one_sentence(comm: Any) -> None:
             replace(WATER, **changes)
     with pytest.raises(InputError, match="implicit=False"):
         laws.Joint(water=WATER, implicit=False)
+    for ends in ({"heel": (-99.0, 0.0)}, {"toe": (9.0, 0.0)}):
+        with pytest.raises(InputError, match="are not the ends of the joint, whose points"):
+            rigid(comm, 4, replace(WATER, **ends))
     with pytest.raises(InputError, match="3 coordinates"):
         rigid(comm, 4, laws.JointWater(heel=(0.0,) * 3, toe=(1.0, 0.0, 0.0), level=1.0))

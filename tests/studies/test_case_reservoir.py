@@ -134,6 +134,8 @@ def test_a_stage_has_its_own_level(shared_tmp: Path) -> None:
         ('level = "9 m"\nmodel', 'level = "9 kN"\nmodel', r"\[reservoir\] level"),
         ('level = "9 m"\nmodel', 'level = "19 m"\nmodel', r"Reservoir: the level 19 m is above"),
         ('silt = "2 m"', 'slit = "2 m"', r"unknown key 'slit' for Reservoir: did you mean silt"),
+        ('toe = ["6 m"', 'toe = ["-6 m"', r"\[contact\[1\].joint\] JointWater: heel .* not the e"),
+        ('cohesion = "300 kPa"', 'cohesion = "1e5*(x-3)"', r"\[contact\[1\].joint\] Joint: the c"),
         ('face = "left"', 'face = "lefft"', r"\[reservoir\] face is 'lefft'"),
     ],
 )
@@ -142,4 +144,5 @@ def test_wrong_reservoirs_are_refused_in_words_of_the_file(
 ) -> None:
     """One sentence with table, key and remedy."""
     with pytest.raises(InputError, match=words):
-        read_case(write(tmp_path, DAM.replace(old, new))).parts(COMM)
+        case = read_case(write(tmp_path, DAM.replace(old, new)))
+        case.problem(COMM)

@@ -27,7 +27,7 @@ from typing import Annotated
 
 import numpy as np
 
-from ..core.algebra import Array, Indices
+from ..core.algebra import Array, Indices, largest
 from ..core.arguments import check_fields
 from ..core.checks import quote
 from ..core.errors import InputError
@@ -38,6 +38,7 @@ from ..core.system import evaluate_history
 from ..core.units import WATER_WEIGHT
 
 QUAKES = ("kept", "follows", "none")
+FAR = 0.5  # of the way from heel to toe: the joint ends nearer to them than that
 Share = Annotated[float, Between(0.0, 1.0), RATIO]
 
 
@@ -155,10 +156,29 @@ class JointWater:
             )
         way = np.subtract(self.toe, self.heel)
         xi = (points - self.heel) @ way / self.length**2
+        self._refuse_elsewhere(surface, xi)
         words = {name: getattr(self, name) for name in WORDS}
         return PlacedWater(
             **words, surface=surface, places=places, xi=xi, height=points[:, -1].copy()
         )
+
+    def _refuse_elsewhere(self, surface: ContactSurface, xi: Array) -> None:
+        """Raise InputError for a heel and a toe that are not near its ends. Collective.
+
+        Args:
+            surface: whose ranks ask.
+            xi: places of this rank's points (m,), 0 at the heel and 1 at the toe.
+        """
+        first = -largest(surface.comm, np.max(-xi, initial=-np.inf))
+        last = largest(surface.comm, np.max(xi, initial=-np.inf))
+        if first > last:  # a joint without points
+            return
+        if not (abs(first) <= FAR and abs(last - 1.0) <= FAR):
+            raise InputError(
+                f"JointWater: heel {self.heel} and toe {self.toe} are not the ends of the joint, "
+                f"whose points lie from {first * self.length:.4g} m to {last * self.length:.4g} m "
+                "on the way from heel to toe: give the places where it begins and ends"
+            )
 
 
 WORDS = tuple(word.name for word in fields(JointWater))

@@ -9,12 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from ....core.errors import InputError
 from ....core.joint_laws import JointLaw
+from ....core.problem import on_points
 from ....core.protocols import FrictionLaw
 from ....core.surfaces import ContactSurface
 from ....laws.joint import Joint
 from ....laws.joints_by_part import JointsByPart
 from .friction_of_tables import count_points, find_mu, list_laws
+from .sentences import write_for_case_files
 from .table_calls import Call, build
 
 
@@ -43,9 +46,25 @@ def join_joints(
     ):
         laws[f"{number}"] = _find_law(contact, rubbing)
     if len(contacts) == 1:
+        _refuse_at_points(laws["1"], contacts[0], surface)
         return laws["1"]
     part = np.repeat(np.arange(len(contacts)), count_points(surface, tables))
     return JointsByPart(laws, part)
+
+
+def _refuse_at_points(law: JointLaw, contact: Call, surface: ContactSurface) -> None:
+    """Raise InputError, with its table, for values that are wrong at the points. Collective.
+
+    Args:
+        law: of the table.
+        contact: the table.
+        surface: whose points they are.
+    """
+    try:
+        on_points(law, surface)
+    except InputError as error:
+        table = contact.arguments["joint"].spot
+        raise table.make_table_error(write_for_case_files(str(error))) from error
 
 
 def _find_law(contact: Call, rubbing: FrictionLaw) -> Any:
