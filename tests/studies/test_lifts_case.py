@@ -124,6 +124,7 @@ def write(folder: Path, text: str = CASE) -> Path:
     return path
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_a_restart_of_lifts_is_the_straight_run(tmp_path: Path) -> None:
     """Six stages, a quake between: stopped in the first motion, and gone on, the last state is the

@@ -20,6 +20,7 @@ from .....fem.output.outline import facets_with_cells
 from ..bodies import Body
 from ..friction_of_tables import count_points, find_mu
 from ..table_calls import Group, build, walk_nodes
+from .water_and_joints import describe_values
 
 _CAPITAL = re.compile(r"(?<=[a-z])(?=[A-Z])")  # between the words of a name such as CompliantBase
 
@@ -86,6 +87,7 @@ def describe_contact(
             "gaps": _find_gaps(whole.gap0[a:b]),
             "held": bool(node.arguments.get("roller", False)),
             "friction": repr(law),
+            "joint": [] if joint is None else list(describe_values(law)),
             "mu": find_mu(law),
             "nodes": "" if census is None else census.in_words(),
             "places": whole.points[a:b],
