@@ -266,3 +266,23 @@ def test_a_run_that_ends_at_rest_prints_what_it_recorded(
     by_hand = 0.5 * weight / modulus + (weight + WEIGHT / 2.0) / modulus
     assert float(line.split()[1]) == pytest.approx(-by_hand, rel=1e-4)
     assert line.split()[2] == "m"
+
+
+@pytest.mark.serial
+def test_a_load_on_ground_that_is_covered_later_is_refused(tmp_path: Path) -> None:
+    """A pressure on facets between ground and fill, which no integral sees; one on the fill's top
+    acts from the stage that places it."""
+    load = '[[system.loads]]\ntype = "Pressure"\nfacets = "{}"\nvalue = 1e4\n'
+    covered = CASE.replace("[gravity]", load.format("ground_top") + "[gravity]", 1)
+    path = write(tmp_path, covered)
+    geo = GEO.replace(
+        'Physical Curve("bottom")', 'Physical Curve("ground_top") = {3};\nPhysical Curve("bottom")'
+    )
+    (tmp_path / "pit.geo").write_text(geo)
+    with pytest.raises(InputError, match="'ground_top' acts on facets between two cells"):
+        read_case(path).problem(MPI.COMM_SELF)
+    seen = CASE[: CASE.index('[[stage]]\nname = "block"')]
+    seen = seen.replace("[gravity]", load.format("fill_top") + "[gravity]", 1)
+    seen += '[[stage]]\nname = "block"\ntype = "static"\nadd = "block"\n'
+    history = read_case(write(tmp_path, seen)).run(MPI.COMM_SELF, progress=False)
+    assert history.state.r_n.sum() == pytest.approx(WEIGHT, rel=1e-7)
