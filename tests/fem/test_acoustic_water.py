@@ -14,6 +14,7 @@ import vi_contact as vc
 from vi_contact import fem, laws
 from vi_contact.core.errors import InputError
 from vi_contact.fem.body.acoustic_water import WaterData, find_water
+from vi_contact.run.damping import first_modes
 from vi_contact.run.modal import lowest_frequency
 
 H, C, RHO = 60.0, 1440.0, 1000.0
@@ -24,7 +25,7 @@ def fill(alpha: float, length: float, layers: int = 20, **others: Any) -> Any:
     """The water before an upright wall, or before its mirror image."""
     y = np.linspace(0.0, H, layers + 1)
     side = others.pop("side", 1.0)
-    settings: dict[str, Any] = {"open_end": True, "speed": C, "highest": None} | others
+    settings: dict[str, Any] = {"open_end": True, "speed": C, "highest": 2.0 * C / H} | others
     data = WaterData(density=RHO, reflection=alpha, length=length, thickness=1.0, **settings)
     return find_water(np.zeros_like(y), y, side, data)
 
@@ -241,6 +242,32 @@ def test_any_number_of_ranks(comm: Any) -> None:
             assert np.abs(first - second).max() <= 1e-10 * np.abs(second).max()
 
 
+def test_modes_and_stages_know_the_water(comm: Any) -> None:
+    """Periods with corners that rub, and a motion that begins where a static stage has ended."""
+    system, base = stand(comm, *SMALL, {"level": 36.0, "model": "acoustic"}, held=False)
+    system = laws.with_weight(system)
+    surface = fem.contact_surface(system, base)
+    still = vc.ContactProblem(system, surface, friction=vc.Coulomb(0.8), mass=vc.ConsistentMass())
+    closed = first_modes(still)
+    assert 0.1 < closed.periods[0] < 0.2 and closed.rigid_motions == 0
+    rest = vc.static_equilibrium(still, tolerance=1e-7)
+    begun, first = fem.release(still, rest, still)
+    run = vc.simulate(
+        begun,
+        scheme=vc.Midpoint(),
+        solver=vc.Condensed(),
+        dt=0.01,
+        t_end=0.1,
+        state=first,
+        record=[vc.Energy(), vc.ReservoirWater()],
+        progress=False,
+    )
+    # nothing shakes it, so nothing moves
+    assert run.history["energy_water"].max() < 1e-9 * run.history["energy_strain"].max()
+    push = 0.5 * 9806.65 * 36.0**2
+    assert np.abs(run.history["water_force_x"]).max() < 1e-5 * push
+
+
 def test_water_that_does_not_weigh(comm: Any) -> None:
     """M r of a vertical acceleration is that of the dry dam, on a slope too."""
     systems = []
@@ -284,6 +311,7 @@ def test_bad_water_is_refused_in_one_sentence(comm: Any) -> None:
         ({"reflection": 1.2}, "the reflection of the bottom"),
         ({"far_end": "rigid"}, "'open' or 'closed'"),
         ({"highest": -3.0}, "the highest frequency"),
+        ({"highest": 500.0}, "give a lower highest"),
         ({"model": "added mass", "speed": 1500.0}, "speed is for compressible water"),
         ({"model": "added mass", "length": 50.0}, "length is for"),
         ({"level": 50.0}, "above the top"),
@@ -292,6 +320,10 @@ def test_bad_water_is_refused_in_one_sentence(comm: Any) -> None:
         water = {"level": 36.0, "model": "acoustic"} | values
         with pytest.raises(InputError, match=words):
             stand(comm, *SMALL, water)
+    for model in ("acoustic", "incompressible"):
+        water = {"level": 36.0, "model": model, "length": 5.0}
+        with pytest.raises(InputError, match="reaches 7.2 m over the water"):
+            stand(comm, *SMALL, water, slope=-0.2)
     system, base = stand(comm, *SMALL, {"level": 36.0}, held=False)
     problem = vc.ContactProblem(system, fem.contact_surface(system, base))
     with pytest.raises(InputError, match="no compressible water"):
