@@ -117,6 +117,7 @@ def test_pressures_at_rest_add_up(comm: Any) -> None:
     assert np.array_equal(wet.inertia(ALONG), dry.inertia(ALONG))
 
 
+@pytest.mark.long
 def test_a_dam_that_cracks_in_an_earthquake(comm: Any) -> None:
     """Reservoir, joint with water and motion together: certified, and the ledger closes."""
     crack = {}

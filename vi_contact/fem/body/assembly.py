@@ -23,7 +23,7 @@ import numpy as np
 import ufl
 from dolfinx.mesh import Mesh
 
-from ...core.algebra import Array, from_each
+from ...core.algebra import Array, Mask, from_each
 from ...core.checks import instance
 from ...core.collective import Parts, agree
 from ...core.errors import InputError
@@ -213,35 +213,16 @@ def assemble(
         loads=(*as_tuple(loads), *list_pressures(reservoir)),
     )
 
-    # unknowns: nodes, which of their components are held or tied, and the elimination of these
-    V = compat.vector_space(mesh, degree) if space is None else space
-    nodes = number_nodes(V)
-    check_nodes(comm, nodes, degree)
-    if nodes.curved:
-        refuse_folded(mesh)
-    # what conditions hold of the owned blocks of the displacement's space
-    supports = [
-        held.support(compat.locate_owned_blocks(V, held.facets.indices), mesh.geometry.dim)
-        for held in conditions.held
-    ]
-    if bcs:
-        supports += [values.support(nodes.owned) for values in read_values(mesh, V, bcs)]
-    supports += [] if missing is None else hold_absent(comm, V, nodes, missing)
-    space = add_water(
-        reservoir,
-        FemSpace(
-            V,
-            nodes,
-            supports,
-            conditions.tied,
-            degree=degree,
-            quadrature_degree=quadrature_degree,
-            absent=missing,
-        ),
-        section.thickness,
+    space = _number_unknowns(
+        mesh,
+        space,
+        bcs,
+        conditions,
+        missing,
+        degree=degree,
+        quadrature_degree=quadrature_degree,
     )
-    if bcs:
-        refuse_contradictions(space)
+    add_water(reservoir, space, section.thickness)
     rigid = np.column_stack([space.restrict(motion) for motion in space.translations])
 
     # the body: weak forms of its materials or of the user, absorbing boundaries, loads
@@ -287,16 +268,7 @@ def assemble(
         M=M,
         C=reduced.C,
         K=reduced.K,
-        load=replace(
-            load,
-            inertial=reduced.inertial,
-            viscous=(*reduced.viscous, *chain(*(boundary.viscous for boundary in acting))),
-            general=(
-                *load.general,
-                *reduced.elastic,
-                *chain(*(boundary.elastic for boundary in acting)),
-            ),
-        ),
+        load=_add_boundary_loads(load, reduced, acting),
         influence=rigid,
         base_mass=base_mass,
         u0=u0,
@@ -316,6 +288,78 @@ def assemble(
     del absorbers, reduced
     give_back(mesh.comm)
     return system
+
+
+def _number_unknowns(
+    mesh: Any,
+    space: Any,
+    bcs: tuple[Any, ...],
+    conditions: Conditions,
+    missing: Mask | None,
+    *,
+    degree: int,
+    quadrature_degree: int | None,
+) -> FemSpace:
+    """Make the numbered unknowns: held and tied components of nodes are eliminated.
+
+    Args:
+        mesh: DOLFINx mesh.
+        space: the user's own DOLFINx space, or None.
+        bcs: the user's own ``dirichletbc`` objects.
+        conditions: what holds, ties and loads the body.
+        missing: which local cells are absent, or None where all are there for good.
+        degree: of the displacement in each cell.
+        quadrature_degree: of all integrals, or None.
+
+    Raises:
+        InputError: nodes without a cell, folded cells, values that contradict one another.
+    """
+    V = compat.vector_space(mesh, degree) if space is None else space
+    comm = MpiComm(mesh.comm)
+    nodes = number_nodes(V)
+    check_nodes(comm, nodes, degree)
+    if nodes.curved:
+        refuse_folded(mesh)
+
+    # what conditions hold of the owned blocks of the displacement's space
+    supports = [
+        held.support(compat.locate_owned_blocks(V, held.facets.indices), mesh.geometry.dim)
+        for held in conditions.held
+    ]
+    if bcs:
+        supports += [values.support(nodes.owned) for values in read_values(mesh, V, bcs)]
+    supports += [] if missing is None else hold_absent(comm, V, nodes, missing)
+
+    numbered = FemSpace(
+        V,
+        nodes,
+        supports,
+        conditions.tied,
+        degree=degree,
+        quadrature_degree=quadrature_degree,
+        absent=missing,
+    )
+    if bcs:
+        refuse_contradictions(numbered)
+    return numbered
+
+
+def _add_boundary_loads(load: Load, reduced: "_Reduced", acting: list[Any]) -> Load:
+    """Return the load with what prescribed motions and absorbing boundaries add to it.
+
+    Args:
+        load: of tractions, body forces and the like.
+        reduced: equations of the free unknowns, whose prescribed motions act as loads.
+        acting: loads of absorbing boundaries.
+    """
+    viscous = chain.from_iterable(boundary.viscous for boundary in acting)
+    elastic = chain.from_iterable(boundary.elastic for boundary in acting)
+    return replace(
+        load,
+        inertial=reduced.inertial,
+        viscous=(*reduced.viscous, *viscous),
+        general=(*load.general, *reduced.elastic, *elastic),
+    )
 
 
 def _choose_forms(

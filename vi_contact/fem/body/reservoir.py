@@ -143,6 +143,17 @@ class Reservoir:
             loads.append(Pressure(self.tail_face, self._press_at(self.tail, self.gamma)))
         return loads
 
+    def name_loads(self) -> list[str]:
+        """Return what the loads of ``make_loads`` are, such as "silt on 'face'"."""
+        names = [f"water on '{self.face.name}'"]
+        if self.floor is not None:
+            names.append(f"water on '{self.floor.name}'")
+        if self.silt is not None:
+            names.append(f"silt on '{self.face.name}'")
+        if self.tail_face is not None:
+            names.append(f"tail water on '{self.tail_face.name}'")
+        return names
+
     def _press_at(self, level: float, weight: float) -> Any:
         """Return the function (points, t) -> weight max(level - y, 0) [Pa]."""
         return lambda points, t: weight * np.maximum(level - points[:, -1], 0.0)
@@ -276,8 +287,8 @@ class Reservoir:
         return AcousticWater(space, wet, data)
 
 
-def add_water(reservoir: Reservoir | None, space: FemSpace, thickness: float) -> FemSpace:
-    """Return the unknowns of a body, with those of compressible water if there is some. Collective.
+def add_water(reservoir: Reservoir | None, space: FemSpace, thickness: float) -> None:
+    """Give the unknowns of a body those of compressible water, if there is some. Collective.
 
     Args:
         reservoir: the reservoir, or None.
@@ -286,7 +297,6 @@ def add_water(reservoir: Reservoir | None, space: FemSpace, thickness: float) ->
     """
     if reservoir is not None and reservoir.model == "acoustic":
         space.water = reservoir.make_water(space, thickness)
-    return space
 
 
 def list_pressures(reservoir: Any) -> list[Pressure]:
