@@ -254,16 +254,13 @@ class Reservoir:
             thickness: of the section [m].
 
         Raises:
-            InputError: tied sides, bodies that come and go by stages, and what ``assemble_mass``
-                refuses.
+            InputError: bodies that come and go by stages, and what ``assemble_mass`` refuses.
         """
-        parts = {"tied sides": space.ties, "bodies that come and go by stages": space.absent}
-        for what, found in parts.items():
-            if found is not None and len(found):
-                raise InputError(
-                    f"Reservoir: model 'acoustic' does not go with {what}: give 'incompressible' "
-                    "or 'added mass'"
-                )
+        if space.absent is not None:
+            raise InputError(
+                "Reservoir: model 'acoustic' does not go with bodies that come and go by stages: "
+                "give 'incompressible' or 'added mass'"
+            )
         self._find_ends(space)
         wet = self._find_wet_face(space, thickness)
         length = self._find_length(wet)

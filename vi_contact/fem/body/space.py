@@ -372,6 +372,8 @@ class FemSpace(NodalSpace):
         self.ids = np.concatenate([self.ids, more])
         self.unknowns += int(total(self.comm, count))
         self.elimination.others = count
+        if self.tied_unknowns is not None:
+            self.tied_unknowns = np.concatenate([self.tied_unknowns, np.zeros(count, dtype=bool)])
         self._others_at = np.tile(point, (count, 1))
         self._others_of = np.full(count, body, dtype=np.int64)
 
