@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.linalg
+from mpi4py import MPI
 from test_reservoir import stand
 
 import vi_contact as vc
 from vi_contact import fem, laws
 from vi_contact.core.errors import InputError
 from vi_contact.fem.body.acoustic_water import WaterData, find_water
+from vi_contact.fem.body.released_supports import begin_from, carry_over
 from vi_contact.meshes import BlockMesh, TwoBlocks
 from vi_contact.run.damping import first_modes
 from vi_contact.run.modal import lowest_frequency
@@ -234,8 +236,6 @@ def test_restarts_and_halved_steps(comm: Any, shared_tmp: Path) -> None:
 
 def test_any_number_of_ranks(comm: Any) -> None:
     """The numbers of one rank, to 1e-10 of the largest."""
-    from mpi4py import MPI
-
     histories = [march(pose(c, *SMALL), 0.01, 0.1).history for c in (comm, MPI.COMM_SELF)]
     if comm.rank == 0:
         for name in ("energy_water", "loss_radiated", "water_force_x", "energy_strain"):
@@ -272,8 +272,6 @@ def march_on_rock(comm: Any, *, follower: bool) -> Any:
 
 def test_a_dam_on_tied_rock(comm: Any) -> None:
     """Certified and closed on any ranks; whichever side follows, the numbers are the same."""
-    from mpi4py import MPI
-
     h = march_on_rock(comm, follower=False)
     alone = march_on_rock(MPI.COMM_SELF, follower=True)
     if comm.rank == 0:
@@ -307,6 +305,26 @@ def test_modes_and_stages_know_the_water(comm: Any) -> None:
     assert run.history["energy_water"].max() < 1e-9 * run.history["energy_strain"].max()
     push = 0.5 * 9806.65 * 36.0**2
     assert np.abs(run.history["water_force_x"]).max() < 1e-5 * push
+
+
+def test_a_stage_fills_the_reservoir(comm: Any) -> None:
+    """The unknowns of the water begin at rest where a stage without water ended, and stay so."""
+    problems = []
+    for water in (None, {"level": 36.0, "model": "acoustic", "reflection": 0.5}):
+        system, base = stand(comm, *SMALL, water, held=False)
+        system = laws.with_weight(system)
+        surface = fem.contact_surface(system, base)
+        law = vc.Coulomb(0.8)
+        problems.append(vc.ContactProblem(system, surface, friction=law, mass=vc.ConsistentMass()))
+    dry, wet = problems
+    rest = vc.static_equilibrium(dry)
+    u = carry_over(dry, wet, dry.cartesian(rest.u))
+    assert len(u) == wet.system.rows
+    assert len(carry_over(wet, dry, u)) == dry.system.rows
+    begun, _ = begin_from(wet, u, np.zeros_like(u), rest)
+    full = vc.static_equilibrium(begun)
+    largest = comm.allreduce(np.abs(full.u).max(initial=0.0), op=MPI.MAX)
+    assert np.abs(wet.system.space.water.own_values(full.u)).max() < 1e-7 * largest
 
 
 def test_water_that_does_not_weigh(comm: Any) -> None:

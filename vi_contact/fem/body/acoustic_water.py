@@ -27,8 +27,8 @@ of the run count the water, and its loss is damping.
 whole: the modes beyond are not left out, they are incompressible. With no mode at all, or for
 c -> infinity, it is ``water_pressure``. y and b are scaled to metres.
 
-Nothing holds b at rest. A spring, with a relaxation rate of 1e-9 c/h, gives static stages one
-answer.
+Nothing holds b at rest. Springs, with a relaxation rate of 1e-9 c/h, give it one answer; in static
+stages they are as stiff as the water (``FemSpace.hold_outlets``).
 """
 
 from dataclasses import dataclass

@@ -77,6 +77,11 @@ class AcousticWater:
         damping = self.equations.damping
         return self.put(damping) > 0.0 if damping.any() else None
 
+    @property
+    def static_springs(self) -> Array:
+        """Return springs (n,) [N/m] that hold the outlets in statics, as stiff as the water."""
+        return self.put(self.equations.damping * (self.data.speed / self.face.depth))
+
     def own_values(self, x: Array) -> Array:
         """Return the values (w,) of the water in a vector (n,), on every rank. Collective."""
         count = self.equations.count
