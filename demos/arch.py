@@ -45,9 +45,7 @@ MAGNIFIED = 20.0  # times, of displacements in pictures
 OUT = Path("results/arch")
 
 
-def make_problem(
-    comm: MPI.Comm, voussoirs: int, record: ground_motion.Record
-) -> vc.ContactProblem:
+def make_problem(comm: MPI.Comm, voussoirs: int, record: ground_motion.Record) -> vc.ContactProblem:
     """Return the arch on its abutments, under its weight and the earthquake.
 
     Args:

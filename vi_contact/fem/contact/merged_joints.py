@@ -91,9 +91,7 @@ def _join_sides(members: list[Joint], ways: list[bool]) -> tuple[Facets, Facets]
     sides = []
     for first in (True, False):
         picked = [0 if way == first else 1 for way in ways]
-        rows = np.concatenate(
-            [joint.rows[k] for joint, k in zip(members, picked, strict=True)]
-        )
+        rows = np.concatenate([joint.rows[k] for joint, k in zip(members, picked, strict=True)])
         measures = np.concatenate(
             [joint.measures[k] for joint, k in zip(members, picked, strict=True)]
         )
