@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from math import sin, sqrt
+from math import atan2, sin, sqrt
 from typing import Any
 
 import numpy as np
 import pytest
+import ufl
 from scipy.integrate import solve_bvp
 from scipy.optimize import brentq
 
@@ -15,6 +16,8 @@ from demos.parts.problems import turning
 from demos.parts.problems.turning import RigidBlock
 from vi_contact import fem
 from vi_contact.core.ledger import energy_balance
+from vi_contact.fem import compat
+from vi_contact.fem.body.turning_forms import TwoEndForms
 from vi_contact.laws import ImpulseUpdate
 from vi_contact.meshes.block import BlockMesh
 
@@ -101,6 +104,59 @@ def test_a_block_is_pressed_by_four_fifths(comm: Any) -> None:
         stretch = 1.0 - 0.8 * t
         force = problem.surface.comm.sum(np.array([state.r_n.sum()]))[0]
         assert force == pytest.approx(law.shear_modulus * (1.0 / stretch - stretch), rel=1e-9)
+
+
+def bend_to_ring(comm: Any, cells: int, stages: int) -> tuple[float, float]:
+    """The gap and the kink where the end of a beam of 1 m meets its start.
+
+    The material has the curvature 2 pi/L at rest: held straight it pushes its clamp by the moment
+    2 pi E I/L, and set free in stages it bends into a ring, which has no stress.
+    """
+    height = 0.05
+    mesh, tags = fem.build_mesh(
+        BlockMesh(lengths=(1.0, height), divisions=(cells, 1), corner=(0.0, -0.5 * height)), comm
+    )
+    system = fem.assemble(mesh, STRING, clamped=tags["left"], degree=2)
+    space: Any = system.space
+    curvature = compat.constant(mesh, 0.0)
+    own = curvature * ufl.SpatialCoordinate(mesh)[1]
+
+    def energy(C: Any) -> Any:
+        along = ufl.as_tensor([[1.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+        strain = 0.5 * (C - ufl.Identity(3)) - (own + 0.5 * own**2) * along
+        return 0.5 * STRING.E * ufl.inner(strain, strain)
+
+    forms: Any = TwoEndForms(space, energy, thickness=1.0, points=1)
+    system = system.changed(internal=forms)
+    far = vc.HalfSpace((0.0, -10.0), (0.0, 1.0))
+    problem = vc.ContactProblem(system, fem.contact_surface(system, tags["right"], obstacle=far))
+
+    curvature.value = 2.0 * np.pi
+    across = np.asarray(space.ids) % 2 == 0
+    pushed = (-space.coordinates[:, 1] * forms.force(np.zeros(system.rows)))[across].sum()
+    moment = system.algebra.comm.sum(np.array([pushed]))[0]
+    assert moment == pytest.approx(2.0 * np.pi * STRING.E * height**3 / 12.0, rel=1e-12)
+
+    state = None
+    for stage in range(stages):
+        curvature.value = 2.0 * np.pi * (stage + 1.0) / stages
+        state = vc.static_equilibrium(problem, state=state)
+    assert state is not None
+    ends = np.array([[1.0, -0.5 * height], [1.0, 0.5 * height]])
+    u = space.sample(problem.cartesian(state.u), space.find_nodes(ends), state.t)
+    low, high = ends + u
+    kink = atan2(low[0] - high[0], high[1] - low[1])
+    return float(np.hypot(*(0.5 * (low + high)))), abs(kink)
+
+
+def test_a_beam_is_bent_into_a_ring(comm: Any) -> None:
+    """By M = 2 pi E I/L: its end closes on its start, and what is left falls with nearly the fourth
+    power of the cells' length, as that of quadratic displacements."""
+    coarse, fine = (bend_to_ring(comm, cells, 60) for cells in (8, 16))
+    assert fine[0] < 0.025
+    assert fine[1] < 0.15
+    assert coarse[0] > 8.0 * fine[0]
+    assert coarse[1] > 8.0 * fine[1]
 
 
 @pytest.mark.slow
