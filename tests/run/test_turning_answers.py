@@ -27,6 +27,7 @@ STRING = vc.SaintVenantKirchhoff(E=1e6, nu=0.0, rho=1000.0)
 OMEGA = 8.0  # rad/s, of the spinning bar
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("law", [vc.SaintVenantKirchhoff, vc.NeoHookean])
 def test_steps_are_of_order_two(comm: Any, law: Any) -> None:
     """Differences of runs with dt, dt/2 and dt/4 fall by four, while a block spins and swings."""
@@ -59,6 +60,7 @@ def stretch_bar() -> Any:
     return lambda X: np.sign(X) * answer.sol(np.abs(X))[0]
 
 
+@pytest.mark.long
 @pytest.mark.two_ranks
 def test_a_spinning_bar_is_stretched_by_its_spin(comm: Any) -> None:
     """Its tip moves out as far as that of the exact bar, 21.07 mm, and the error falls by four with
@@ -158,6 +160,7 @@ def find_kept(problem: Any, state: Any) -> Any:
     return np.array([turning.find_energy(problem, state), *momenta])
 
 
+@pytest.mark.serial  # ranks: test_ranks_agree
 def test_a_spinning_cylinder_grows(comm: Any) -> None:
     """Its rim moves out by rho omega² a³/(8 (lambda + mu)), the better the finer (by 7.0 and 2.2 %
     more with 4 and 8 cells across) and the stiffer (strains of 1e-2 are 6e-3 of it). Its cells are
@@ -214,6 +217,8 @@ def bend_to_ring(comm: Any, cells: int, stages: int) -> tuple[float, float]:
     return float(np.hypot(*(0.5 * (low + high)))), abs(kink)
 
 
+@pytest.mark.serial  # ranks: test_ranks_agree
+@pytest.mark.slow
 def test_a_beam_is_bent_into_a_ring(comm: Any) -> None:
     """By M = 2 pi E I/L: its end closes on its start, and what is left falls with nearly the fourth
     power of the cells' length, as that of quadratic displacements."""
@@ -224,6 +229,7 @@ def test_a_beam_is_bent_into_a_ring(comm: Any) -> None:
     assert coarse[1] > 8.0 * fine[1]
 
 
+@pytest.mark.serial  # ranks: test_ranks_agree
 @pytest.mark.slow
 def test_a_barrel_is_pressed_by_four_fifths(comm: Any) -> None:
     """A block between rough planes in a medium that brakes it: it bulges, stays symmetric, and the
@@ -251,6 +257,7 @@ def test_a_barrel_is_pressed_by_four_fifths(comm: Any) -> None:
     assert 1.0 + 2.0 * right[0] > 1.6358
 
 
+@pytest.mark.serial  # ranks: test_ranks_agree
 @pytest.mark.slow
 @pytest.mark.parametrize(("width", "off"), [(0.25, 0.01), (0.5, 0.06)])
 def test_a_landing_loses_the_rate_of_housner(comm: Any, width: float, off: float) -> None:
@@ -274,6 +281,7 @@ def test_a_landing_loses_the_rate_of_housner(comm: Any, width: float, off: float
     assert sqrt(after / before) == pytest.approx(1.0 - 1.5 * sin(alpha) ** 2, rel=off)
 
 
+@pytest.mark.serial  # ranks: test_ranks_agree
 @pytest.mark.slow
 @pytest.mark.parametrize(("strength", "falls"), [(1.95, False), (2.15, True)])
 def test_a_pulse_overturns_a_column_as_the_rigid_one(
@@ -287,6 +295,7 @@ def test_a_pulse_overturns_a_column_as_the_rigid_one(
         assert tilt == pytest.approx(rigid, rel=0.2)
 
 
+@pytest.mark.long
 def test_ranks_agree(comm: Any) -> None:
     """A block lands on a rough corner: the places of all nodes are those of one rank."""
     from mpi4py import MPI
