@@ -18,8 +18,9 @@ converge linearly and are accelerated (``acceleration``). K is replaced by the t
 the passes that are still expected would cost more than a new factor, counted by unknowns and never
 by a clock, and where a pass has no smaller residual than the best one before it.
 
-A tangent that is not symmetric (psi < phi) is taken as a whole where there is no contact, as its
-LU is all that such a pass needs; beside contact its symmetric part leads the passes.
+A tangent that is not symmetric (psi < phi) is taken as a whole, by its LU, where ``Condensed`` makes
+the passes and contact conditions are few; else its symmetric part leads the passes, which may then
+converge slowly or not at all.
 
 From such a pass only a part may be gone. Between d_k and d_k + delta, which both are outside of the
 obstacle, the potential of all forces falls at first, if A is positive definite, with the slope
@@ -40,6 +41,7 @@ import numpy as np
 from ..core.algebra import Array, EffectiveMatrix, Mask, Matrix, largest
 from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
+from ..core.sizes import OWN_CONDITIONS
 from ..core.stage import NonlinearForces, add_increment
 from ..core.step import Solver, StepProblem, StepResult
 from ..core.verify import kkt_residual
@@ -48,6 +50,7 @@ from .automatic import Automatic
 from .certified import ADVICE, NEAR, CertifiedSolver
 from .condensed import Condensed
 from .line_search import FLAT, find_finite, find_flat
+from .normal.lemke import Lemke
 from .passes import Certified, Passes, certify, pose_about
 
 log = logging.getLogger(__name__)
@@ -163,10 +166,13 @@ class NonlinearSolver:
         self.counts: list[int] = []
         self.A = A
         self._reference = self._prepare(A)
-        # Whole tangents that are not symmetric: where nothing but a factor is made of them.
+        # Whole tangents that are not symmetric: where few conditions are condensed, without a joint.
         internal = problem.system.internal
+        surface = problem.surface
+        conditions = surface.total * (1 + surface.tangents.shape[1])
         self._takes_whole = (
-            problem.surface.total == 0
+            conditions <= OWN_CONDITIONS
+            and problem.joint is None
             and not getattr(internal, "symmetric", True)
             and getattr(problem.system.algebra, "keeps_whole", False)
             and isinstance(solvers[0], Automatic | Condensed)
@@ -180,15 +186,19 @@ class NonlinearSolver:
         )
 
     def _prepare_whole(self, A: EffectiveMatrix) -> CertifiedSolver:
-        """Return the certified solver of linear steps without contact, by the LU of a tangent.
+        """Return the certified solver of linear steps by the LU of a tangent.
+
+        Its contact is condensed by methods that take any matrix: Lemke's, and Newton's with
+        friction.
 
         Args:
             A: which is not symmetric.
         """
         algebra: Any = A.algebra
         whole = EffectiveMatrix(A.matrix, algebra.unsymmetric(), space=A.space, inertia=A.inertia)
+        solvers = [Condensed(Lemke())]
         return CertifiedSolver(
-            self._problem, whole, self._scale, [Condensed()], self._tolerance, advice=self._advice
+            self._problem, whole, self._scale, solvers, self._tolerance, advice=self._advice
         )
 
     def solve(self, step: StepProblem) -> Certified:
