@@ -231,8 +231,8 @@ def test_the_yield_acceleration_of_an_infinite_slope(comm: Any) -> None:
 
 @pytest.mark.parametrize("mu", [0.0, 0.4], ids=["smooth", "rough"])
 def test_a_footing_on_sand_without_dilatancy(comm: Any, mu: float) -> None:
-    """Sand of 30° with psi = 0 below a strip, in eight load steps by exact contact: tangents are not
-    symmetric, and are taken as a whole beside contact. The strip bears more than Davis' reduced
+    """Sand of 30° with psi = 0 below a strip, in eight load steps by exact contact: tangents are
+    not symmetric, and are taken as a whole beside contact. The strip bears more than Davis' reduced
     angle says, tan phi* = sin phi, with N_q = 12.6, and less than on sand that dilates with phi."""
     depths = np.linspace(0.0, 0.08, 9)[1:]
     found = {psi: sink_on_sand(comm, psi, mu, depths) for psi in (0.0, 30.0)}

@@ -18,9 +18,9 @@ converge linearly and are accelerated (``acceleration``). K is replaced by the t
 the passes that are still expected would cost more than a new factor, counted by unknowns and never
 by a clock, and where a pass has no smaller residual than the best one before it.
 
-A tangent that is not symmetric (psi < phi) is taken as a whole, by its LU, where ``Condensed`` makes
-the passes and contact conditions are few; else its symmetric part leads the passes, which may then
-converge slowly or not at all.
+A tangent that is not symmetric (psi < phi) is taken as a whole, by its LU, where ``Condensed``
+makes the passes and contact conditions are few; else its symmetric part leads the passes, which may
+then converge slowly or not at all.
 
 From such a pass only a part may be gone. Between d_k and d_k + delta, which both are outside of the
 obstacle, the potential of all forces falls at first, if A is positive definite, with the slope
@@ -166,7 +166,7 @@ class NonlinearSolver:
         self.counts: list[int] = []
         self.A = A
         self._reference = self._prepare(A)
-        # Whole tangents that are not symmetric: where few conditions are condensed, without a joint.
+        # Whole tangents that are not symmetric: where few conditions are condensed, with no joint.
         internal = problem.system.internal
         surface = problem.surface
         conditions = surface.total * (1 + surface.tangents.shape[1])
