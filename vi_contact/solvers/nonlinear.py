@@ -65,6 +65,7 @@ MARGIN = 4.0  # passes that a tangent needs itself
 # The share of the reference in tangents, each tried where the one before was of no use. All but the
 # first are braced at the contact.
 SHARES = (0.0, 0.0, 0.1, 0.4)
+FAR = 1e3  # times the increment so far: a pass that adds so much is by a tangent that is singular
 TURNED = 0.5  # half the angle of a step that is too long for anything else
 BRACE = 10.0  # of the stiffness of a closed point: that of a spring which braces a tangent there
 
@@ -282,6 +283,7 @@ class NonlinearSolver:
             here = walk.here
             posed = pose_about(walk.whole, here.d, here.rest, here.active, walk.solver.A)
             linear = walk.solver.solve(posed)
+            self._refuse_runaway(walk, linear.result.x)
         except (InputError, StepFailure) as refusal:
             log.debug("%s: a pass is of no use (%s)", _name(walk.whole), refusal)
             of_tangent = walk.tangent_due or walk.solver is not self._reference
@@ -294,6 +296,23 @@ class NonlinearSolver:
             return None
         walk.escalated = walk.escalated or linear.escalated
         return self._judge(walk, posed, linear.result)
+
+    def _refuse_runaway(self, walk: Walk, x: Array) -> None:
+        """Raise StepFailure for a pass that a whole tangent sends far away. Collective.
+
+        Such a tangent may be all but singular, as flow is not unique where psi < phi: stresses are
+        lost in the rounding of the strains then, and balanced all the same.
+
+        Args:
+            walk: where the pass starts.
+            x: what it adds to the increment (n,).
+        """
+        if not self._takes_whole or walk.solver is self._reference:
+            return
+        system = self._problem.system
+        far = system.algebra.dot(x, x)
+        if far > FAR**2 * system.algebra.dot(walk.here.d, walk.here.d):
+            raise StepFailure("a tangent leads too far")
 
     def _take_tangent(self, walk: Walk) -> None:
         """Go on with the tangent of where the walk is. Collective."""
