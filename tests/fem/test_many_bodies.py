@@ -21,7 +21,7 @@ from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError, ViContactError
 from vi_contact.core.ledger import energy_balance
 from vi_contact.core.problem import ContactProblem
-from vi_contact.meshes import BlockMesh, Blocks, CutApart, GeoFile
+from vi_contact.meshes import BlockMesh, Blocks, CutApart, GeoFile, MasonryMesh
 from vi_contact.run.damping import first_modes
 
 COMM = MPI.COMM_WORLD
@@ -757,3 +757,39 @@ def test_scaled_units_scale_the_forces():
         state = vc.static_equilibrium(problem)
         found.append(np.column_stack([state.r_n, state.r_t]) / (stress * length))
     assert np.abs(found[0] - found[1]).max() < 1e-7 * found[0].max()
+
+
+# Joints that share facets
+# --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.two_ranks
+@pytest.mark.parametrize(
+    ("given", "move"),
+    [
+        ({"divisions": (3, 2)}, 0.0),
+        ({"divisions": (4, 2), "unlike": 3}, 0.0),
+        ({"divisions": (4, 2), "unlike": 3}, 1e4),
+    ],
+    ids=["odd", "unlike", "far away"],
+)
+def test_found_joints_of_unlike_meshes_press_alike(given, move):
+    """1 MPa on top is 1 MPa in all bed joints, found from the geometry, where a stone ends in the
+    middle of another's facet: the facet is covered by two stones together. Stones that
+    contact alone holds are in equilibrium to 1e-9 of the largest forces, pressures of small facets
+    to 1e-5. Far away coordinates have rounding of 1e-12 m."""
+    mesh, tags = fem.build_mesh(MasonryMesh(stones=2, courses=2, half_first=True, **given), COMM)
+    turn = np.array([[cos(0.5), -sin(0.5)], [sin(0.5), cos(0.5)]])
+    mesh.geometry.x[:, :2] = mesh.geometry.x[:, :2] @ turn.T + move
+    up = turn[:, 1]
+    system = fem.assemble(
+        mesh, PLAIN, clamped=tags["bottom"], loads=fem.Traction(tags["top"], tuple(-1e6 * up))
+    )
+    surface = fem.contact_pairs(system, tags=tags)
+    problem = ContactProblem(system, surface, friction=vc.Coulomb(MU))
+    state = vc.static_equilibrium(problem)
+    upright = np.abs(seen(surface).normals @ up) > 0.5
+    pressure = pressures(problem, state)
+    assert pressure[upright] == pytest.approx(np.full(upright.sum(), 1e6), rel=1e-5)
+    assert np.abs(pressure[~upright]).max() < 1e-5 * 1e6
+    assert state.certificate <= 1e-9

@@ -28,6 +28,7 @@ from .facing import Sights, find_sights, group_pairs
 from .joined import joined_surfaces
 from .joint_list import NAMED, Joint, Joints
 from .matching import Matching, NodeToNode
+from .merged_joints import merge_joints
 from .mortar import DualMortar
 from .overlaps import find_deepest, refuse_overlaps
 from .pairs import contact_pair
@@ -113,7 +114,9 @@ def contact_pairs(
     """Make the contact conditions of all joints that ``find_joints`` finds. Collective.
 
     They are those of ``contact_pair`` for each joint, in the order of the list, joined by
-    ``joined_surfaces``.
+    ``joined_surfaces``. Joints by mortar that share a facet, as two stones above a third that share
+    one of its facets, are one pair: such a facet is covered wholly by both, while the part that
+    each covers alone would press unevenly.
 
     Args:
         system: the system of all bodies, of ``assemble``.
@@ -134,11 +137,9 @@ def contact_pairs(
             "or look at the mesh, where bodies may share nodes (meshes.CutApart)"
         )
     surfaces = []
-    for joint in joints:
-        usual = NodeToNode() if joint.alike else DualMortar()
-        surfaces.append(
-            contact_pair(system, joint.facets1, joint.facets2, matching=matching or usual)
-        )
+    for facets1, facets2, alike in merge_joints(joints, matching):
+        usual = NodeToNode() if alike else DualMortar()
+        surfaces.append(contact_pair(system, facets1, facets2, matching=matching or usual))
     return joined_surfaces(*surfaces)
 
 
@@ -361,6 +362,8 @@ def _make_joint(mesh: Mesh, skin: Skin, pairs: Sights, names: Sequence[str], pla
         middle=weights @ own.middles,
         ends=_find_ends(skin, own, normal),
         alike=_are_alike(skin, own, facets),
+        rows=(facets[0], facets[1]),
+        measures=(skin.measures[facets[0]], skin.measures[facets[1]]),
     )
 
 

@@ -36,6 +36,8 @@ class Joint:
         middle: (d,) of the common part, on side 1 [m].
         ends: (2, d) of the common part in the plane, on side 1 [m]; None in space.
         alike: whether the facets of both sides are the same but for the gap.
+        rows: (2,) the facets of either side, as numbers in the outlines of all bodies.
+        measures: (2,) lengths [m] or areas [m²] of these facets.
     """
 
     number: int
@@ -52,6 +54,8 @@ class Joint:
     middle: Array
     ends: Array | None
     alike: bool
+    rows: tuple[Indices, Indices] = field(repr=False)
+    measures: tuple[Array, Array] = field(repr=False)
 
     def row(self) -> tuple[str, ...]:
         """Return the row of the table: the words under ``HEADINGS``."""

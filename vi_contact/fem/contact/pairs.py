@@ -698,7 +698,7 @@ def _measure_gap(
     gap = np.sum((matched.P @ side2.nodes.points - nodes.points) * directions, axis=1)
     # rounding is that of the mesh's size, or of coordinates where the mesh lies far from the origin
     far = float(np.abs(side2.nodes.points).max(initial=0.0))
-    rounding = max(1e-12 * space.size, ROUND_OFF * far)
+    rounding = max(1e-12 * space.size, float(ROUND_OFF) * far)
     behind = -gap - np.maximum(matched.overlap, rounding)
     if behind.max() > 0.0:
         worst = int(np.argmax(behind))
