@@ -98,6 +98,7 @@ def measure(problem: vc.ContactProblem, dt: float, steps: int) -> Numbers:
     clock.watch(YieldingForce, "residual", "stress")
     clock.watch(StrainPoints, "free_matrix", "assembly")
     clock.watch(NonlinearSolver, "_prepare", "factor")
+    clock.watch(NonlinearSolver, "_prepare_whole", "factor")
     stepper = vc.Stepper(problem, scheme=vc.Midpoint(), solver=vc.Condensed())
     reports = []
     start = time.process_time()

@@ -227,3 +227,44 @@ def test_the_yield_acceleration_of_an_infinite_slope(comm: Any) -> None:
     found = vc.limit_load(problem, force=way, first=0.05, rtol=0.02)
     assert found.multiplier <= exact * (1.0 + 1e-6)
     assert found.lost_at >= exact * (1.0 - 1e-6)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.4], ids=["smooth", "rough"])
+def test_a_footing_on_sand_without_dilatancy(comm: Any, mu: float) -> None:
+    """Sand of 30° with psi = 0 below a strip, in eight load steps by exact contact: tangents are
+    not symmetric, and are taken as a whole beside contact. The strip bears more than Davis' reduced
+    angle says, tan phi* = sin phi, with N_q = 12.6, and less than on sand that dilates with phi."""
+    depths = np.linspace(0.0, 0.08, 9)[1:]
+    found = {psi: sink_on_sand(comm, psi, mu, depths) for psi in (0.0, 30.0)}
+    loads = found[0.0]
+    assert len(loads) == len(depths)
+    assert np.all(np.diff(loads) > 0.0)
+    assert 12.6 < loads[-1] < found[30.0][-1]
+    assert loads[-1] / loads[-2] < loads[1] / loads[0]
+
+
+def sink_on_sand(comm: Any, psi: float, mu: float, depths: Any) -> list[float]:
+    """Mean pressures below a stiff strip over the surcharge beside it, on quadrilaterals."""
+    q = 10e3
+    sand = MohrCoulomb(1e3 * q, 0.3, 2000.0, 0.0, 30.0, psi)
+    mesh, tags = fem.build_mesh(BlockMesh(lengths=(5.0, 2.5), divisions=(10, 5)), comm)
+    below = fem.Facets.where("strip", mesh, lambda x: (x[1] > 2.5 - 1e-9) & (x[0] < 1.0 + 1e-9))
+    beside = fem.Facets.where("beside", mesh, lambda x: (x[1] > 2.5 - 1e-9) & (x[0] > 1.0 - 1e-9))
+    system = fem.assemble(
+        mesh,
+        sand,
+        integration="bbar",
+        clamped=[tags["bottom"], tags["right"]],
+        prescribed=fem.Prescribed(tags["left"], components=(0,)),
+        initial_stress=lambda x: np.tile([-q, -q, -q, 0.0], (len(x), 1)),
+        loads=fem.Pressure(beside, q),
+    )
+    stamp = vc.HalfSpace(point=(0.0, 2.5), normal=(0.0, -1.0))
+    surface = fem.contact_surface(system, below, obstacle=stamp)
+    friction = vc.Coulomb(mu) if mu else vc.Frictionless()
+    problem = vc.ContactProblem(system, surface.moving(towards=lambda t: t), friction=friction)
+    loads = []
+    for state in vc.quasi_static(problem, depths):
+        assert state.certificate is not None and state.certificate <= 1e-9
+        loads.append(float(state.r_n.sum()) / q)
+    return loads

@@ -151,6 +151,12 @@ class RememberingInTurnedUnknowns(InTurnedUnknowns):
         standing = self.internal.go_on(memory, self.T @ u)
         return RememberingInTurnedUnknowns(standing, self.T, self.algebra)
 
+    def whole_tangent(self, u: Array) -> Matrix:
+        """Return Tᵀ p'(T u) T (n, n) [N/m], where p' may be no symmetric matrix."""
+        internal: Any = self.internal  # which has one where its laws say so
+        turned: Any = self.algebra.congruence(self.T, internal.whole_tangent(self.T @ u))
+        return turned
+
     def find_cells(self, name: str) -> Indices:
         """Return numbers of the owned cells of an array of the memory: cells do not turn."""
         return self.internal.find_cells(name)

@@ -18,8 +18,9 @@ converge linearly and are accelerated (``acceleration``). K is replaced by the t
 the passes that are still expected would cost more than a new factor, counted by unknowns and never
 by a clock, and where a pass has no smaller residual than the best one before it.
 
-A tangent that is not symmetric (psi < phi) is taken as a whole where there is no contact, as its
-LU is all that such a pass needs; beside contact its symmetric part leads the passes.
+A tangent that is not symmetric (psi < phi) is taken as a whole, by its LU, where ``Condensed``
+makes the passes and contact conditions are few; else its symmetric part leads the passes, which may
+then converge slowly or not at all.
 
 From such a pass only a part may be gone. Between d_k and d_k + delta, which both are outside of the
 obstacle, the potential of all forces falls at first, if A is positive definite, with the slope
@@ -40,6 +41,7 @@ import numpy as np
 from ..core.algebra import Array, EffectiveMatrix, Mask, Matrix, largest
 from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
+from ..core.sizes import OWN_CONDITIONS
 from ..core.stage import NonlinearForces, add_increment
 from ..core.step import Solver, StepProblem, StepResult
 from ..core.verify import kkt_residual
@@ -48,6 +50,7 @@ from .automatic import Automatic
 from .certified import ADVICE, NEAR, CertifiedSolver
 from .condensed import Condensed
 from .line_search import FLAT, find_finite, find_flat
+from .normal.lemke import Lemke
 from .passes import Certified, Passes, certify, pose_about
 
 log = logging.getLogger(__name__)
@@ -62,6 +65,7 @@ MARGIN = 4.0  # passes that a tangent needs itself
 # The share of the reference in tangents, each tried where the one before was of no use. All but the
 # first are braced at the contact.
 SHARES = (0.0, 0.0, 0.1, 0.4)
+FAR = 1e3  # times the increment so far: a pass that adds so much is by a tangent that is singular
 TURNED = 0.5  # half the angle of a step that is too long for anything else
 BRACE = 10.0  # of the stiffness of a closed point: that of a spring which braces a tangent there
 
@@ -163,10 +167,13 @@ class NonlinearSolver:
         self.counts: list[int] = []
         self.A = A
         self._reference = self._prepare(A)
-        # Whole tangents that are not symmetric: where nothing but a factor is made of them.
+        # Whole tangents that are not symmetric: where few conditions are condensed, with no joint.
         internal = problem.system.internal
+        surface = problem.surface
+        conditions = surface.total * (1 + surface.tangents.shape[1])
         self._takes_whole = (
-            problem.surface.total == 0
+            conditions <= OWN_CONDITIONS
+            and problem.joint is None
             and not getattr(internal, "symmetric", True)
             and getattr(problem.system.algebra, "keeps_whole", False)
             and isinstance(solvers[0], Automatic | Condensed)
@@ -180,15 +187,19 @@ class NonlinearSolver:
         )
 
     def _prepare_whole(self, A: EffectiveMatrix) -> CertifiedSolver:
-        """Return the certified solver of linear steps without contact, by the LU of a tangent.
+        """Return the certified solver of linear steps by the LU of a tangent.
+
+        Its contact is condensed by methods that take any matrix: Lemke's, and Newton's with
+        friction.
 
         Args:
             A: which is not symmetric.
         """
         algebra: Any = A.algebra
         whole = EffectiveMatrix(A.matrix, algebra.unsymmetric(), space=A.space, inertia=A.inertia)
+        solvers = [Condensed(Lemke())]
         return CertifiedSolver(
-            self._problem, whole, self._scale, [Condensed()], self._tolerance, advice=self._advice
+            self._problem, whole, self._scale, solvers, self._tolerance, advice=self._advice
         )
 
     def solve(self, step: StepProblem) -> Certified:
@@ -273,6 +284,7 @@ class NonlinearSolver:
             here = walk.here
             posed = pose_about(walk.whole, here.d, here.rest, here.active, walk.solver.A)
             linear = walk.solver.solve(posed)
+            self._refuse_runaway(walk, linear.result.x)
         except (InputError, StepFailure) as refusal:
             log.debug("%s: a pass is of no use (%s)", _name(walk.whole), refusal)
             of_tangent = walk.tangent_due or walk.solver is not self._reference
@@ -285,6 +297,23 @@ class NonlinearSolver:
             return None
         walk.escalated = walk.escalated or linear.escalated
         return self._judge(walk, posed, linear.result)
+
+    def _refuse_runaway(self, walk: Walk, x: Array) -> None:
+        """Raise StepFailure for a pass that a whole tangent sends far away. Collective.
+
+        Such a tangent may be all but singular, as flow is not unique where psi < phi: stresses are
+        lost in the rounding of the strains then, and balanced all the same.
+
+        Args:
+            walk: where the pass starts.
+            x: what it adds to the increment (n,).
+        """
+        if not self._takes_whole or walk.solver is self._reference:
+            return
+        system = self._problem.system
+        far = system.algebra.dot(x, x)
+        if far > FAR**2 * system.algebra.dot(walk.here.d, walk.here.d):
+            raise StepFailure("a tangent leads too far")
 
     def _take_tangent(self, walk: Walk) -> None:
         """Go on with the tangent of where the walk is. Collective."""

@@ -7,9 +7,8 @@ u begins from it anew, so that a step that is thrown away leaves nothing behind.
 what the points know at u, and ``go_on`` makes the force of a body that stands there.
 
 Tangents of laws whose flow is not along the normal of the yield surface (psi < phi) are not
-symmetric. Beside contact the matrix is made of their symmetric part: it only leads the iterations
-of a step, whose answer is certified without it, and all solvers for symmetric matrices stay. A body
-without contact takes the whole tangent.
+symmetric. Solvers that take any matrix get the whole tangent; the others its symmetric part, which
+only leads the iterations of a step: the answer is certified without it.
 """
 
 from collections.abc import Mapping, Sequence
