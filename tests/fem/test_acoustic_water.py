@@ -8,12 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.linalg
+from mpi4py import MPI
 from test_reservoir import stand
 
 import vi_contact as vc
 from vi_contact import fem, laws
 from vi_contact.core.errors import InputError
 from vi_contact.fem.body.acoustic_water import WaterData, find_water
+from vi_contact.fem.body.released_supports import begin_from, carry_over
+from vi_contact.meshes import BlockMesh, TwoBlocks
+from vi_contact.run.damping import first_modes
 from vi_contact.run.modal import lowest_frequency
 
 H, C, RHO = 60.0, 1440.0, 1000.0
@@ -24,7 +28,7 @@ def fill(alpha: float, length: float, layers: int = 20, **others: Any) -> Any:
     """The water before an upright wall, or before its mirror image."""
     y = np.linspace(0.0, H, layers + 1)
     side = others.pop("side", 1.0)
-    settings: dict[str, Any] = {"open_end": True, "speed": C, "highest": None} | others
+    settings: dict[str, Any] = {"open_end": True, "speed": C, "highest": 2.0 * C / H} | others
     data = WaterData(density=RHO, reflection=alpha, length=length, thickness=1.0, **settings)
     return find_water(np.zeros_like(y), y, side, data)
 
@@ -232,13 +236,144 @@ def test_restarts_and_halved_steps(comm: Any, shared_tmp: Path) -> None:
 
 def test_any_number_of_ranks(comm: Any) -> None:
     """The numbers of one rank, to 1e-10 of the largest."""
-    from mpi4py import MPI
-
     histories = [march(pose(c, *SMALL), 0.01, 0.1).history for c in (comm, MPI.COMM_SELF)]
     if comm.rank == 0:
         for name in ("energy_water", "loss_radiated", "water_force_x", "energy_strain"):
             first, second = (history[name] for history in histories)
             assert np.abs(first - second).max() <= 1e-10 * np.abs(second).max()
+
+
+def march_on_rock(comm: Any, *, follower: bool) -> Any:
+    """Run a dam on rock whose sides are tied; the wet face ends at its heel."""
+    lower = BlockMesh(lengths=(60.0, 20.0), divisions=(6, 2))
+    upper = BlockMesh(lengths=(20.0, 40.0), divisions=(2, 5))
+    mesh, tags = fem.build_mesh(TwoBlocks(lower=lower, upper=upper, offset=(20.0,)), comm)
+    sides = [tags["lower_left"], tags["lower_right"]]
+    wet = fem.Reservoir(tags["upper_left"], 56.0, model="acoustic", reflection=0.8)
+    system = fem.assemble(
+        mesh,
+        vc.LinearElastic(E=20e9, nu=0.2, rho=2400.0),
+        prescribed=fem.Prescribed(tags["lower_bottom"]),
+        tied=fem.Tied(*(sides[::-1] if follower else sides)),
+        reservoir=wet,
+    )
+    system = laws.with_weight(system)
+    surface = fem.contact_pair(system, tags["upper_bottom"], tags["lower_top"])
+    shake = vc.Harmonic(amplitude=3.0, frequency=3.0, direction=(1.0, 0.0))
+    problem = vc.ContactProblem(
+        system,
+        surface,
+        friction=vc.Coulomb(0.8),
+        mass=vc.ConsistentMass(),
+        excitation=shake,
+    )
+    return march(problem, 0.01, 0.1).history
+
+
+def test_a_dam_on_tied_rock(comm: Any) -> None:
+    """Certified and closed on any ranks; whichever side follows, the numbers are the same."""
+    h = march_on_rock(comm, follower=False)
+    alone = march_on_rock(MPI.COMM_SELF, follower=True)
+    if comm.rank == 0:
+        assert h["certificate"].max() < 1e-9
+        assert np.abs(h["energy_defect"]).max() < 1e-8 * h["work_input"].max()
+        for name in ("energy_water", "loss_bottom", "water_force_x"):
+            assert np.abs(h[name] - alone[name]).max() <= 1e-10 * np.abs(alone[name]).max()
+
+
+def test_modes_and_stages_know_the_water(comm: Any) -> None:
+    """Periods with corners that rub, and a motion that begins where a static stage has ended."""
+    system, base = stand(comm, *SMALL, {"level": 36.0, "model": "acoustic"}, held=False)
+    system = laws.with_weight(system)
+    surface = fem.contact_surface(system, base)
+    still = vc.ContactProblem(system, surface, friction=vc.Coulomb(0.8), mass=vc.ConsistentMass())
+    closed = first_modes(still)
+    assert 0.1 < closed.periods[0] < 0.2 and closed.rigid_motions == 0
+    rest = vc.static_equilibrium(still, tolerance=1e-7)
+    begun, first = fem.release(still, rest, still)
+    run = vc.simulate(
+        begun,
+        scheme=vc.Midpoint(),
+        solver=vc.Condensed(),
+        dt=0.01,
+        t_end=0.1,
+        state=first,
+        record=[vc.Energy(), vc.ReservoirWater()],
+        progress=False,
+    )
+    # nothing shakes it, so nothing moves
+    assert run.history["energy_water"].max() < 1e-9 * run.history["energy_strain"].max()
+    push = 0.5 * 9806.65 * 36.0**2
+    assert np.abs(run.history["water_force_x"]).max() < 1e-5 * push
+
+
+def test_a_base_that_moves_is_a_ground_that_moves(comm: Any) -> None:
+    """The motion of a held base pushes the water as the same acceleration of the ground does."""
+    import dolfinx
+
+    shape = dolfinx.mesh.CellType.quadrilateral
+    mesh = dolfinx.mesh.create_rectangle(comm, [[0.0, 0.0], [20.0, 40.0]], [2, 6], shape)
+    at = {"base": (1, 0.0), "face": (0, 0.0), "top": (1, 40.0)}
+    parts = {
+        name: fem.Facets.where(name, mesh, lambda x, k=k, value=value: np.isclose(x[k], value))
+        for name, (k, value) in at.items()
+    }
+    frequency = 3.0
+    w = 2.0 * np.pi * frequency
+    history = (
+        lambda t: (t - np.sin(w * t) / w) / w,
+        lambda t: (1.0 - np.cos(w * t)) / w,
+        lambda t: np.sin(w * t),
+    )
+    moved = fem.Prescribed(parts["base"], displacement=(1.0, 0.0), history=history)
+    forces = []
+    for prescribed, shake in (
+        (fem.Prescribed(parts["base"]), vc.Harmonic(1.0, frequency, direction=(1.0, 0.0))),
+        (moved, ()),
+    ):
+        system = fem.assemble(
+            mesh,
+            vc.LinearElastic(E=20e9, nu=0.2, rho=2400.0),
+            prescribed=prescribed,
+            reservoir=fem.Reservoir(parts["face"], 36.0, model="acoustic", reflection=0.7),
+        )
+        roof = vc.HalfSpace(point=(0.0, 50.0), normal=(0.0, -1.0))
+        surface = fem.contact_surface(system, parts["top"], obstacle=roof)
+        problem = vc.ContactProblem(system, surface, mass=vc.ConsistentMass(), excitation=shake)
+        run = vc.simulate(
+            problem,
+            scheme=vc.Midpoint(),
+            solver=vc.Condensed(),
+            dt=4e-3,
+            t_end=0.2,
+            record=[vc.Energy(), vc.ReservoirWater()],
+            progress=False,
+        )
+        h = run.history
+        assert np.abs(h["energy_defect"]).max() < 1e-8 * np.abs(h["work_input"]).max()
+        forces.append(h["water_force_x"])
+    # of second order in dt: the one takes the mean of accelerations, the other that in the middle
+    assert np.abs(forces[0] - forces[1]).max() < 5e-3 * np.abs(forces[0]).max()
+
+
+def test_a_stage_fills_the_reservoir(comm: Any) -> None:
+    """The unknowns of the water begin at rest where a stage without water ended, and stay so."""
+    problems = []
+    for water in (None, {"level": 36.0, "model": "acoustic", "reflection": 0.5}):
+        system, base = stand(comm, *SMALL, water, held=False)
+        system = laws.with_weight(system)
+        surface = fem.contact_surface(system, base)
+        law = vc.Coulomb(0.8)
+        problems.append(vc.ContactProblem(system, surface, friction=law, mass=vc.ConsistentMass()))
+    dry, wet = problems
+    rest = vc.static_equilibrium(dry)
+    u = carry_over(dry, wet, dry.cartesian(rest.u))
+    assert len(u) == wet.system.rows
+    assert len(carry_over(wet, dry, u)) == dry.system.rows
+    begun, _ = begin_from(wet, u, np.zeros_like(u), rest)
+    full = vc.static_equilibrium(begun)
+    largest = comm.allreduce(np.abs(full.u).max(initial=0.0), op=MPI.MAX)
+    assert np.abs(wet.system.space.water.own_values(full.u)).max() < 1e-7 * largest
 
 
 def test_water_that_does_not_weigh(comm: Any) -> None:
@@ -284,6 +419,7 @@ def test_bad_water_is_refused_in_one_sentence(comm: Any) -> None:
         ({"reflection": 1.2}, "the reflection of the bottom"),
         ({"far_end": "rigid"}, "'open' or 'closed'"),
         ({"highest": -3.0}, "the highest frequency"),
+        ({"highest": 500.0}, "give a lower highest"),
         ({"model": "added mass", "speed": 1500.0}, "speed is for compressible water"),
         ({"model": "added mass", "length": 50.0}, "length is for"),
         ({"level": 50.0}, "above the top"),
@@ -292,6 +428,10 @@ def test_bad_water_is_refused_in_one_sentence(comm: Any) -> None:
         water = {"level": 36.0, "model": "acoustic"} | values
         with pytest.raises(InputError, match=words):
             stand(comm, *SMALL, water)
+    for model in ("acoustic", "incompressible"):
+        water = {"level": 36.0, "model": model, "length": 5.0}
+        with pytest.raises(InputError, match="reaches 7.2 m over the water"):
+            stand(comm, *SMALL, water, slope=-0.2)
     system, base = stand(comm, *SMALL, {"level": 36.0}, held=False)
     problem = vc.ContactProblem(system, fem.contact_surface(system, base))
     with pytest.raises(InputError, match="no compressible water"):

@@ -85,9 +85,7 @@ def test_smooth_plates_carry_the_stress_of_the_law(comm: Any) -> None:
     assert abs(sigma - elastic) > 0.1 * elastic
 
 
-@pytest.mark.parametrize(
-    "scheme", [vc.Midpoint(), vc.ZienkiewiczWoodTaylor(), vc.Trapezoidal(), vc.HHT(-0.05)]
-)
+@pytest.mark.parametrize("scheme", [vc.ZienkiewiczWoodTaylor(), vc.Trapezoidal(), vc.HHT(-0.05)])
 def test_a_column_that_is_pushed_until_it_yields(comm: Any, scheme: Any) -> None:
     """What acts on the column beside its weight is its foot, which brings it its momentum:
     ∑ R_x dt = Δ ∫ rho v, with damping of the elastic K. A cut on the foot is the foot."""
@@ -110,7 +108,7 @@ def test_a_column_that_is_pushed_until_it_yields(comm: Any, scheme: Any) -> None
     ]
     dt = 2e-3
     solution = vc.simulate(
-        problem, dt=dt, steps=100, scheme=scheme, state=start, record=record, progress=False
+        problem, dt=dt, steps=50, scheme=scheme, state=start, record=record, progress=False
     )
     h = solution.history
     assert h["loss_plastic"][-1] > 0.0

@@ -121,7 +121,7 @@ def test_pressures_at_rest_add_up(comm: Any) -> None:
 def test_a_dam_that_cracks_in_an_earthquake(comm: Any) -> None:
     """Reservoir, joint with water and motion together: certified, and the ledger closes."""
     crack = {}
-    for model in ("added mass", "at rest"):
+    for model in ("added mass", "acoustic", "at rest"):
         water = {"level": 36.0, "model": model}
         system, base = stand(
             comm,
@@ -165,6 +165,7 @@ def test_a_dam_that_cracks_in_an_earthquake(comm: Any) -> None:
         assert np.abs(history["energy_defect"]).max() < 1e-8 * history["work_input"].max()
         crack[model] = history["crack_length"].max()
     assert 5.0 < crack["added mass"] < 25.0 and crack["at rest"] > 5.0
+    assert 5.0 < crack["acoustic"] < 25.0
 
 
 @pytest.mark.serial

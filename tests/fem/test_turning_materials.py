@@ -104,6 +104,24 @@ def test_an_energy_with_other_constants_is_refused() -> None:
         fem.assemble(mesh, stressed)
 
 
+@pytest.mark.serial
+def test_an_energy_is_judged_in_cells_of_any_shape() -> None:
+    """By its own points: in a cell that is no parallelogram the points of K give another one."""
+    from mpi4py import MPI
+
+    def lean(x: Any) -> Any:
+        return x + 0.2 * np.column_stack([x[:, 0] * x[:, 1], 0.0 * x[:, 0]])
+
+    mesh, _ = fem.build_mesh(
+        BlockMesh(lengths=(1.0, 0.5), divisions=(2, 1), deform=lean), MPI.COMM_SELF
+    )
+    fem.assemble(mesh, SOFT)
+    given = {"nu": RUBBER.nu, "rho": RUBBER.rho}
+    fem.assemble(mesh, fem.Hyperelastic(energy=own_rubber, E=RUBBER.E, **given))
+    with pytest.raises(InputError, match="not the E and nu that are given beside it"):
+        fem.assemble(mesh, fem.Hyperelastic(energy=own_rubber, E=1.00001 * RUBBER.E, **given))
+
+
 @pytest.mark.parametrize("pull", [3e5, -1e5])
 def test_a_bar_is_pulled(comm: Any, pull: float) -> None:
     """Without lateral strain (nu = 0) the dead load is P = E/2 (s³ - s) at the stretch s."""

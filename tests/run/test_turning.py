@@ -297,6 +297,28 @@ def test_a_block_is_thrown_into_a_corner(comm: Any, wall: Any, friction: Any) ->
 
 
 @pytest.mark.long
+@pytest.mark.serial
+def test_a_thin_body_does_not_go_through_in_one_step() -> None:
+    """A strip of 2 cm at 20 m/s: a step takes it down by twenty times its thickness."""
+    from mpi4py import MPI
+
+    mesh, _ = fem.build_mesh(
+        BlockMesh(lengths=(1.0, 0.02), divisions=(8, 1), corner=(0.0, 0.3)), MPI.COMM_SELF
+    )
+    system = fem.assemble(mesh, replace(SOFT, E=1e7), initial_velocity=(0.0, -20.0))
+    problem = vc.ContactProblem(system, fem.contact_surface(system, obstacle=FLOOR))
+    before = 0.5 * SOFT.rho * 0.02 * 20.0**2  # J, all of it of motion
+    landed = False
+    for state, report in vc.march(problem, dt=0.02, steps=10):
+        gap = problem.surface.gap(state.t) - problem.surface.normal_values(state.u)
+        assert gap.min() > -1e-12
+        assert turning.find_energy(problem, state) < before * (1.0 + 1e-10)
+        step = energy_balance(problem, report.old, report.new, report.averages())
+        assert abs(step.defect) < 1e-11 * before
+        landed = landed or bool(state.active.any())
+    assert landed
+
+
 def test_an_edge_rubs_on_floor_and_wall(comm: Any) -> None:
     """A box slides along the edge of a floor and a wall that carry it: each takes mu times its own
     impulse, with the nodes of the edge, which face both, in either."""

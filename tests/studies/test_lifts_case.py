@@ -11,6 +11,7 @@ import pytest
 from mpi4py import MPI
 
 from vi_contact import InputError, StepFailure
+from vi_contact.practice.cli.entry import main
 from vi_contact.practice.plots.deformed import read_frames
 from vi_contact.practice.studies import read_case
 
@@ -111,6 +112,8 @@ remove = "block"
 name = "again"
 type = "dynamic"
 """
+SIDES = """fixed = "bottom"
+prescribed = [{facets = "sides", components = [0]}]"""
 WEIGHT = 2400 * 9.80665 * 2.0  # N/m
 
 
@@ -241,3 +244,45 @@ def test_a_body_that_is_taken_away_and_placed_again(tmp_path: Path) -> None:
         assert history["contact_force_y"][-1] == pytest.approx(WEIGHT, rel=1e-7)
         soil = 2000 * 9.80665 * 4.0
         assert history["reaction_y_rock"][-1] == pytest.approx(soil + WEIGHT, rel=1e-8)
+
+
+@pytest.mark.serial
+def test_a_run_that_ends_at_rest_prints_what_it_recorded(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Two static stages by the command: the column of fill settles by hand, w h² (k - ½)/M of each
+    lift, and the number is printed."""
+    head = CASE[: CASE.index("[[stage]]")].replace('fixed = "bottom"', SIDES)
+    probe = '[[record]]\ntype = "Probe"\npoints = {middle = [1.0, 1.0]}\n'
+    stages = '[[stage]]\nname = "a"\ntype = "static"\n'
+    stages += '[[stage]]\nname = "b"\ntype = "static"\nadd = ["fill", "block"]\n'
+    path = write(tmp_path, head + probe + stages)
+    assert main(["run", str(path), "--out", str(tmp_path / "out"), "--quiet"]) == 0
+    told = capsys.readouterr().out
+    assert "u_y_middle" in told
+    line = next(one for one in told.splitlines() if "u_y_middle" in one)
+    modulus = 20e6 * 0.7 / (1.3 * 0.4)
+    weight = 2000 * 9.80665
+    by_hand = 0.5 * weight / modulus + (weight + WEIGHT / 2.0) / modulus
+    assert float(line.split()[1]) == pytest.approx(-by_hand, rel=1e-4)
+    assert line.split()[2] == "m"
+
+
+@pytest.mark.serial
+def test_a_load_on_ground_that_is_covered_later_is_refused(tmp_path: Path) -> None:
+    """A pressure on facets between ground and fill, which no integral sees; one on the fill's top
+    acts from the stage that places it."""
+    load = '[[system.loads]]\ntype = "Pressure"\nfacets = "{}"\nvalue = 1e4\n'
+    covered = CASE.replace("[gravity]", load.format("ground_top") + "[gravity]", 1)
+    path = write(tmp_path, covered)
+    geo = GEO.replace(
+        'Physical Curve("bottom")', 'Physical Curve("ground_top") = {3};\nPhysical Curve("bottom")'
+    )
+    (tmp_path / "pit.geo").write_text(geo)
+    with pytest.raises(InputError, match="'ground_top' acts on facets between two cells"):
+        read_case(path).problem(MPI.COMM_SELF)
+    seen = CASE[: CASE.index('[[stage]]\nname = "block"')]
+    seen = seen.replace("[gravity]", load.format("fill_top") + "[gravity]", 1)
+    seen += '[[stage]]\nname = "block"\ntype = "static"\nadd = "block"\n'
+    history = read_case(write(tmp_path, seen)).run(MPI.COMM_SELF, progress=False)
+    assert history.state.r_n.sum() == pytest.approx(WEIGHT, rel=1e-7)

@@ -138,8 +138,13 @@ class ContactProblem:
 
     @cached_property
     def static_load(self) -> SemiDiscreteSystem:
-        """Return the system of the gravity stage: in the basis of the equations, unshaken."""
-        return self._make_relative(self.turned)
+        """Return the system of the gravity stage: in the basis of the equations, unshaken.
+
+        What meets dashpots alone is held there (``outlets`` of the space).
+        """
+        system = self._make_relative(self.turned)
+        hold = getattr(system.space, "hold_outlets", None)
+        return system if hold is None else hold(system)
 
     @cached_property
     def turned(self) -> SemiDiscreteSystem:

@@ -30,6 +30,7 @@ from typing import Any
 import numpy as np
 
 from .algebra import Array, EffectiveMatrix, Mask, Matrix
+from .internal import turns
 from .problem import ContactProblem
 from .step import Balance, State, StepProblem, StepResult
 from .system import SemiDiscreteSystem
@@ -261,6 +262,11 @@ class NonlinearForces:
     def turns(self) -> bool:
         """Say whether the internal force is that of a body that turns."""
         return self.stage.between is not None
+
+    @property
+    def may_have_turned(self) -> bool:
+        """Say whether the body is one that turns, in a step of time or at rest."""
+        return turns(self.system.internal)
 
     def find_rest(self, d: Array) -> Array:
         """Return what is left of the forces at an increment (n,): b - A d of a linear body."""

@@ -230,8 +230,9 @@ class NonlinearSolver:
         if d is not None:
             start = Place(d, forces.find_rest(d), step.active)
         walk = Walk(step, forces, start, start, self._reference, self._make_acceleration())
-        # The reference of a body that has turned is of no use: its passes go with a tangent.
-        walk.tangent_due = forces.turns
+        # The reference of a body that has turned is of no use: its passes go with a tangent, in
+        # static stages too.
+        walk.tangent_due = forces.may_have_turned
         return walk
 
     def _go(self, walk: Walk, passes: Passes[Pass]) -> Iterator[Pass]:

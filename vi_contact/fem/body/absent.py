@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Mask, from_each, total
+from ...core.checks import refuse
 from ...core.errors import InputError
 from ...laws.materials import LinearElastic
 from ...laws.yielding import YieldingMaterial
@@ -21,7 +22,7 @@ from .. import compat
 from ..mesh.communicators import MpiComm
 from ..mesh.group_checks import cells_of
 from ..mesh.numbering import NodeTable
-from ..mesh.tagged_mesh import Cells, local_count
+from ..mesh.tagged_mesh import Cells, Facets, local_count
 from .dirichlet import GivenValues
 from .loads import Support
 
@@ -45,6 +46,29 @@ def find_absent(mesh: Any, absent: Any) -> Mask:
     if not total(MpiComm(mesh.comm), float((~missing).sum())):
         raise InputError("assemble: all cells of the mesh are absent; leave one body there")
     return missing
+
+
+def refuse_covered(mesh: Any, loads: Sequence[Any]) -> None:
+    """Raise InputError for loads on facets that a later body covers. Collective.
+
+    Integrals over facets are of the boundary of the whole mesh. A load on a facet between two
+    cells, such as the floor of a pit that is not yet dug, would be left out without a word.
+
+    Args:
+        mesh: of the body.
+        loads: of ``fem.assemble``.
+    """
+    outer = Facets.where("", mesh, lambda x: np.ones(x.shape[1], dtype=bool))
+    defects = []
+    for load in loads:
+        facets = getattr(load, "facets", None)
+        if isinstance(facets, Facets) and not np.isin(facets.indices, outer.indices).all():
+            defects.append(
+                f"assemble: the load on '{facets.name}' acts on facets between two cells of the "
+                "mesh, where it is not seen: draw the body that covers them with points of its "
+                "own, or load a thin layer by BodyForce"
+            )
+    refuse(defects, MpiComm(mesh.comm))
 
 
 def let_remember(material: Any, forms: Any) -> Any:

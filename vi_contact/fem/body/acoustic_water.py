@@ -27,8 +27,8 @@ of the run count the water, and its loss is damping.
 whole: the modes beyond are not left out, they are incompressible. With no mode at all, or for
 c -> infinity, it is ``water_pressure``. y and b are scaled to metres.
 
-Nothing holds b at rest. A spring, with a relaxation rate of 1e-9 c/h, gives static stages one
-answer.
+Nothing holds b at rest. Springs, with a relaxation rate of 1e-9 c/h, give it one answer; in static
+stages they are as stiff as the water (``FemSpace.hold_outlets``).
 """
 
 from dataclasses import dataclass
@@ -59,7 +59,7 @@ class WaterData:
         reflection: alpha of the bottom, 1 for one that is rigid.
         open_end: whether waves leave at the far end; else it stands still.
         length: its distance [m].
-        highest: frequency of the last mode [Hz]; None for 8 c/4h.
+        highest: frequency of the last mode [Hz].
         thickness: of the section [m].
     """
 
@@ -68,7 +68,7 @@ class WaterData:
     reflection: float
     open_end: bool
     length: float
-    highest: float | None
+    highest: float
     thickness: float
 
 
@@ -117,7 +117,7 @@ def find_water(x: Array, y: Array, side: float, data: WaterData) -> WaterEquatio
     """
     layers = len(y)
     depth = float(y[-1] - y[0])
-    highest = data.highest or OVERTONES * data.speed / (4.0 * depth)
+    highest = data.highest
 
     # Columns of nodes: those of the face, moved away, until the far end stands upright.
     widest = min(CELLS * depth, data.speed / (CELLS_OF_WAVE * highest))
@@ -132,8 +132,7 @@ def find_water(x: Array, y: Array, side: float, data: WaterData) -> WaterEquatio
     solve = splu(Kp).solve
 
     # Modes, and outlets: widths s of nodes, and s q of both boundaries.
-    area = depth * data.length
-    expected = np.pi * area * (highest / data.speed) ** 2  # by Weyl's law
+    expected = count_modes(depth * data.length, highest, data.speed)
     squares, shapes = _find_modes(Kp, Mp, (2.0 * np.pi * highest) ** 2, expected)
     of_end, of_bottom = _measure_outlets(columns, y, data)
     leaks = of_end + of_bottom
@@ -171,6 +170,17 @@ def find_water(x: Array, y: Array, side: float, data: WaterData) -> WaterEquatio
         modes=modes,
         at_end=at_end,
     )
+
+
+def count_modes(area: float, highest: float, speed: float) -> float:
+    """Return about how many modes there are up to a frequency, by Weyl's law.
+
+    Args:
+        area: of the water [m²].
+        highest: the frequency [Hz].
+        speed: c [m/s].
+    """
+    return float(np.pi * area * (highest / speed) ** 2)
 
 
 def _find_modes(

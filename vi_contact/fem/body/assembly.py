@@ -41,7 +41,7 @@ from ..matrices.petsc_rows import transfer
 from ..mesh.communicators import MpiComm, give_back
 from ..mesh.numbering import number_nodes
 from ..mesh.tagged_mesh import Cells, Facets
-from .absent import find_absent, hold_absent, let_remember
+from .absent import find_absent, hold_absent, let_remember, refuse_covered
 from .assembly_checks import (
     check_body,
     check_initial,
@@ -189,6 +189,8 @@ def assemble(
     # what is given: kinds, groups, conditions that go together
     bcs = as_tuple(bcs)
     refuse_uneven(comm, bcs)
+    if missing is not None:
+        refuse_covered(mesh, as_tuple(loads))
     if bcs or space is not None:
         space, degree = choose_space(mesh, space, bcs)
     section, damping = check_body(

@@ -64,17 +64,17 @@ class Elimination:
             u: (n,) the free vector.
             values: (full,) U at the held components, zero elsewhere; it is overwritten.
         """
+        of_nodes = u[: len(u) - self.others]
         if self._P is None:
-            values[self.free] = u[: len(u) - self.others]
+            values[self.free] = of_nodes
         else:
-            values += self._P @ u
+            values += self._P @ of_nodes
         return values
 
     def pull(self, force: Array) -> Array:
         """Return Pᵀ f, forces on the free components; tied nodes count at their partners."""
-        if self._P is not None:
-            return self._P.transpose_apply(force)
-        return self._make_room(force[self.free])
+        pulled = force[self.free] if self._P is None else self._P.transpose_apply(force)
+        return self._make_room(pulled)
 
     def reduce(self, full: Any) -> Any:
         """Return PᵀAP of a PETSc matrix of all components, a new one. Collective."""

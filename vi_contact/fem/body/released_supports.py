@@ -117,6 +117,23 @@ def same_supports(before: ContactProblem, problem: ContactProblem) -> bool:
     return True
 
 
+def carry_over(before: ContactProblem, problem: ContactProblem, x: Array) -> Array:
+    """Return a vector (n,) of a system on the unknowns of another one with the same supports.
+
+    Those of compressible water begin anew where the reservoir is another one.
+
+    Args:
+        before: the problem whose system it belongs to.
+        problem: the other one.
+        x: displacements, velocities or forces.
+    """
+    old, new = before.system.space, problem.system.space
+    if not isinstance(old, FemSpace) or not isinstance(new, FemSpace):
+        return x
+    gone, come = old.elimination.others, new.elimination.others
+    return x if gone == come else np.concatenate([x[: len(x) - gone], np.zeros(come)])
+
+
 def begin_from(
     problem: ContactProblem, u0: Array, v0: Array, state: State, force: Array | float = 0.0
 ) -> tuple[ContactProblem, State]:

@@ -33,7 +33,7 @@ from ...core.units import STANDARD_GRAVITY, WATER_WEIGHT
 from .. import compat
 from ..mesh.group_checks import facets_of
 from ..mesh.tagged_mesh import Facets
-from .acoustic_water import WaterData
+from .acoustic_water import OVERTONES, WaterData, count_modes
 from .loads import Pressure
 from .space import FemSpace
 from .water_pressure import find_compliance
@@ -45,6 +45,7 @@ FAR_ENDS = ("open", "closed")
 WESTERGAARD = 0.875
 QUADRATURE = 8  # degree, for the root of the depth
 FAR = 5.0  # of the depth: distance of the far end
+MOST_MODES = 1000  # unknowns whose mass matrix is dense
 SPEED_OF_SOUND = 1440.0  # of water [m/s]
 OF_ACOUSTIC = {"speed": SPEED_OF_SOUND, "reflection": 1.0, "far_end": "open", "highest": None}
 
@@ -221,7 +222,7 @@ class Reservoir:
         wet = self._find_wet_face(space, thickness)
         G = np.zeros((wet.nodes, wet.nodes))
         G[np.ix_(wet.below, wet.below)] = find_compliance(
-            wet.x, wet.y, wet.side, self.length or FAR * wet.depth
+            wet.x, wet.y, wet.side, self._find_length(wet)
         )[:-1, :-1]
         # S has the thickness on both sides, and the water has it once
         return wet.spread(space, self.density / thickness * G)
@@ -234,6 +235,17 @@ class Reservoir:
             )
         return WetFace(space, self.face, self.level, thickness)
 
+    def _find_length(self, wet: WetFace) -> float:
+        """Return the distance of the far end [m], which lies beyond all of the face."""
+        length = self.length or FAR * wet.depth
+        reach = float(np.max(wet.side * (wet.x - wet.x[0])))
+        if length <= reach:
+            raise InputError(
+                f"Reservoir: the length {length:g} m ends within '{self.face.name}', which reaches "
+                f"{reach:g} m over the water: give a larger one"
+            )
+        return length
+
     def make_water(self, space: FemSpace, thickness: float) -> AcousticWater:
         """Return compressible water, whose unknowns are added to those of the body. Collective.
 
@@ -242,25 +254,31 @@ class Reservoir:
             thickness: of the section [m].
 
         Raises:
-            InputError: tied sides, bodies that come and go by stages, and what ``assemble_mass``
-                refuses.
+            InputError: bodies that come and go by stages, and what ``assemble_mass`` refuses.
         """
-        parts = {"tied sides": space.ties, "bodies that come and go by stages": space.absent}
-        for what, found in parts.items():
-            if found is not None and len(found):
-                raise InputError(
-                    f"Reservoir: model 'acoustic' does not go with {what}: give 'incompressible' "
-                    "or 'added mass'"
-                )
+        if space.absent is not None:
+            raise InputError(
+                "Reservoir: model 'acoustic' does not go with bodies that come and go by stages: "
+                "give 'incompressible' or 'added mass'"
+            )
         self._find_ends(space)
         wet = self._find_wet_face(space, thickness)
+        length = self._find_length(wet)
+        highest = self.highest or OVERTONES * self.speed / (4.0 * wet.depth)
+        modes = count_modes(wet.depth * length, highest, self.speed)
+        if modes > MOST_MODES:
+            raise InputError(
+                f"Reservoir: water that is compressible up to {highest:g} Hz over {length:g} m has "
+                f"about {modes:.0f} modes, and {MOST_MODES} is the most: give a lower highest, or "
+                "a smaller length"
+            )
         data = WaterData(
             density=self.density,
             speed=self.speed,
             reflection=self.reflection,
             open_end=self.far_end == "open",
-            length=self.length or FAR * wet.depth,
-            highest=self.highest,
+            length=length,
+            highest=highest,
             thickness=thickness,
         )
         return AcousticWater(space, wet, data)

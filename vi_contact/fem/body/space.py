@@ -258,6 +258,18 @@ class FemSpace(NodalSpace):
         """Return the unknowns (n,) of water that leaves the reservoir, None without any."""
         return None if self.water is None else self.water.outlets
 
+    def hold_outlets(self, system: SemiDiscreteSystem) -> SemiDiscreteSystem:
+        """Return the system of a static stage, whose outlets are held by springs. Collective.
+
+        Nothing loads them there, so that the answer is the same for any springs.
+        """
+        if self.outlets is None:
+            return system
+        rows = np.flatnonzero(self.outlets)
+        springs = self.water.static_springs[rows]
+        held = system.algebra.local(rows, rows, springs, system.rows)
+        return system.changed(K=system.algebra.combine([(1.0, system.K), (1.0, held)]))
+
     @cached_property
     def hierarchy(self) -> Hierarchy | None:
         """Return the hierarchy of P2 tetrahedra, None of other cells.
@@ -372,6 +384,8 @@ class FemSpace(NodalSpace):
         self.ids = np.concatenate([self.ids, more])
         self.unknowns += int(total(self.comm, count))
         self.elimination.others = count
+        if self.tied_unknowns is not None:
+            self.tied_unknowns = np.concatenate([self.tied_unknowns, np.zeros(count, dtype=bool)])
         self._others_at = np.tile(point, (count, 1))
         self._others_of = np.full(count, body, dtype=np.int64)
 

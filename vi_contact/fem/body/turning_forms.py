@@ -34,7 +34,7 @@ from ...laws.hyperelastic import SaintVenantKirchhoff
 from ...laws.materials import Damping, MassProportional, NoDamping, PlaneStress, Section
 from .. import compat
 from .forms import ElasticForms
-from .hyperelastic import TURNING, find_energy
+from .hyperelastic import TURNING, Hyperelastic, find_energy
 from .initial_strains import InitialStrain
 from .internal_forms import InternalForms
 from .rigid_motion import RigidMotion
@@ -63,8 +63,7 @@ class TwoEndForms(InternalForms):
         """
         d = space.dimension
         h = compat.constant(space.mesh, thickness)
-        degree = space.quadrature_degree or 2 * space.degree
-        dx = ufl.dx(metadata={"quadrature_degree": degree})
+        dx = _measure(space)
         one = ufl.Identity(d)
 
         def strain(F: Any) -> Any:
@@ -130,12 +129,23 @@ class TwoEndForms(InternalForms):
         self._put_both(u0, u1)
         return self._assemble_tangent(self._about)
 
+    def assemble_beside(self, form: Any) -> Matrix:
+        """Return another bilinear form on the free unknowns (n, n). Collective."""
+        compiled = on_all(self._space.comm, "a form", lambda: self._space.compile_form(form))
+        return self._assemble_tangent(compiled)
+
     def turn_on(self, u0: Array, u1: Array) -> Array:
         """Return where u1 (n,) would be if bodies turned on their way from u0. Collective."""
         space = self._space
         u = space.expand(u0, 0.0)
         way = space.expand(u1, 0.0) - u
         return u0 + space.restrict(self._motion.turn_on(space.points + u, way))
+
+
+def _measure(space: FemSpace) -> Any:
+    """Return the measure of the cells, by the rule of points of bodies that turn."""
+    degree = space.quadrature_degree or 2 * space.degree
+    return ufl.dx(metadata={"quadrature_degree": degree})
 
 
 def _restrict(S: Any, d: int) -> Any:
@@ -197,6 +207,9 @@ class TurningForms(ElasticForms):
         super().__init__(space, materials, section, damping)
         energies = [find_energy(given, space.mesh) for _, given in materials]
         parts = _mark_cells(space, materials)
+        self._parts = parts
+        self._materials = [given for _, given in materials]
+        self._own_energy = any(isinstance(given, Hyperelastic) for given in self._materials)
 
         def energy(C: Any) -> Any:
             return sum(part * density(C) for part, density in zip(parts, energies, strict=True))
@@ -213,10 +226,32 @@ class TurningForms(ElasticForms):
     def own(self, system: SemiDiscreteSystem) -> None:
         """Remember the matrices of a system, and check the energy by them. Collective."""
         super().own(system)
-        self._check_rest(system.K)
+        if self._own_energy:
+            self._check_rest(self._assemble_hooke())
+
+    def _assemble_hooke(self) -> Matrix:
+        """Return the stiffness at small strain, by the points of the energy. Collective.
+
+        In cells that are no parallelograms other points give another one.
+        """
+        space = self.space
+        u = ufl.TrialFunction(space.V)
+        v = ufl.TestFunction(space.V)
+        lame = 0.0
+        shear = 0.0
+        for part, given in zip(self._parts, self._materials, strict=True):
+            lame = lame + part * compat.constant(space.mesh, given.lame_lambda)
+            shear = shear + part * compat.constant(space.mesh, given.shear_modulus)
+        density = lame * ufl.div(u) * ufl.div(v)
+        density += 2.0 * shear * ufl.inner(ufl.sym(ufl.grad(u)), ufl.sym(ufl.grad(v)))
+        return self.internal.assemble_beside(self.section.thickness * density * _measure(space))
 
     def _check_rest(self, K: Matrix) -> None:
-        """Raise InputError unless force and stiffness at rest are zero and K. Collective."""
+        """Raise InputError unless force and stiffness at rest are zero and K. Collective.
+
+        Args:
+            K: the stiffness at small strain, by the points of the energy.
+        """
         space = self.space
         rest = np.zeros(len(space.ids))
         off = self.internal.tangent(rest).diagonal() - K.diagonal()

@@ -44,6 +44,8 @@ class AcousticWater:
         self.equations: WaterEquations = space.comm.bcast(own)
         self.here = space.comm.rank == space.comm.size - 1
         self._start = space.unknowns
+        owned = np.array(space.comm.bcast(space.comm.gather(len(space.ids))))
+        self._first = int(owned[: space.comm.rank].sum())
         body = self._find_body()
         space.add_unknowns(self.equations.count if self.here else 0, face.points[0], body)
 
@@ -74,6 +76,11 @@ class AcousticWater:
         """Return which unknowns (n,) are outlets, None where nothing flows out."""
         damping = self.equations.damping
         return self.put(damping) > 0.0 if damping.any() else None
+
+    @property
+    def static_springs(self) -> Array:
+        """Return springs (n,) [N/m] that hold the outlets in statics, as stiff as the water."""
+        return self.put(self.equations.damping * (self.data.speed / self.face.depth))
 
     def own_values(self, x: Array) -> Array:
         """Return the values (w,) of the water in a vector (n,), on every rank. Collective."""
@@ -144,24 +151,29 @@ class AcousticWater:
         face = self.face
         coupling = face.S[:, face.below] @ self.equations.coupling
 
-        # unknowns of the touched components over all ranks, -1 where they are held
+        # unknowns of the touched components over all ranks, -1 where they are held; tied ones have
+        # those of others, and their entries add up there
         place = face.touched - face.first
         mine = np.flatnonzero((place >= 0) & (place < face.own.shape[0]))
         unknown = np.zeros(len(face.touched))
         unknown[mine] = space.numbers.ravel()[place[mine]]
         numbers = np.rint(space.comm.sum(unknown)).astype(np.int64)
-        local = mine[numbers[mine] >= 0]
+
+        # rows of the face, of this rank's unknowns
         w = self.equations.count
-        rows = np.repeat(space.free_index[place[local]], w)
+        owned = len(space.ids) - (w if self.here else 0)
+        rows = numbers - self._first
+        local = np.flatnonzero((rows >= 0) & (rows < owned))
         columns = np.tile(self._start + np.arange(w), len(local))
-        entries = self._rows(rows, columns, coupling[local].ravel())
+        entries = self._rows(np.repeat(rows[local], w), columns, coupling[local].ravel())
         if not self.here:
             return entries
+
+        # rows of the water
         moves = np.flatnonzero(numbers >= 0)
-        below = len(space.ids) - w + np.arange(w)
-        rows = np.repeat(below, len(moves))
+        below = np.repeat(owned + np.arange(w), len(moves))
         columns = np.tile(numbers[moves], w)
-        return entries + self._rows(rows, columns, coupling[moves].T.ravel())
+        return entries + self._rows(below, columns, coupling[moves].T.ravel())
 
     def _rows(self, rows: Indices, columns: Indices, values: Array) -> sp.csr_matrix:
         """Return owned rows with these entries."""

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 # Options that steer the steps of a run: their names in the namespace, and as users write them.
 OPTIONS = {"restart": "--restart", "changed": "--restart-changed", "wall_time": "--wall-time"}
 
+# Columns of every history, which tell of steps and not of what was recorded.
+OF_STEPS = {"t", "k", "iterations", "certificate", "escalated"}
+
 
 def add_case_commands(commands: Any) -> None:
     """Add ``run``, ``cases``, ``schema`` and ``new`` to the commands of the top parser."""
@@ -215,7 +218,24 @@ def _run(options: argparse.Namespace) -> str:
     if comm.rank != 0:
         return ""
     title = case.tables.get("title") or path.stem
-    return f"{title}\n{solution.summary()}\noutput: {out}"
+    recorded = _tell_recorded(solution) if case.stages else ""
+    return f"{title}\n{solution.summary()}{recorded}\noutput: {out}"
+
+
+def _tell_recorded(solution: Any) -> str:
+    """Return a line for each number that the records of a static stage have; none of a run.
+
+    Args:
+        solution: of the last stage.
+    """
+    if len(solution.history["t"]) > 1:
+        return ""
+    lines = [""]
+    for name, (unit, _) in solution.columns.items():
+        values = solution.history[name]
+        if values.ndim == 1 and name not in OF_STEPS and not name.startswith("a_g_"):
+            lines.append(f"  {name:26s} {values[-1]: .4e} {unit}".rstrip())
+    return "\n".join(lines)
 
 
 def _read_case(options: argparse.Namespace, path: Path) -> "Case":

@@ -110,7 +110,8 @@ def sections_of(
     """
     if len(run.history["t"]) < 2:
         raise InputError(
-            f"the run in '{run.folder}' has no steps yet: report on it when it has some"
+            f"the run in '{run.folder}' has no steps yet: report on it when it has some; of a "
+            "static stage see history.csv, which has one row"
         )
     numbers = ReportNumbers(units or ReportUnits(), read_slice(model))
     if columns is None:

@@ -28,6 +28,7 @@ from ....core.step import State
 from ....fem.body.placing import adds_or_removes, keep_gaps, place, same_bodies
 from ....fem.body.released_supports import (
     begin_from,
+    carry_over,
     find_internal_force,
     find_removed_support,
     release,
@@ -312,10 +313,11 @@ def _enter(stage: Stage, reached: Reached, comm: Any) -> tuple[Reached, Parts, S
             parts = replace(parts, surface=surface)
             problem = stage.case.problem(comm, parts)
         if same_supports(before, problem) and (stage.static or not reached.static):
-            u, v = before.cartesian(state.u), before.cartesian(state.v)
-            begun, first = begin_from(
-                problem, u, 0.0 * v if stage.static else v, state, reached.force
-            )
+            u, v = (carry_over(before, problem, before.cartesian(x)) for x in (state.u, state.v))
+            force = reached.force
+            if isinstance(force, np.ndarray):
+                force = carry_over(before, problem, force)
+            begun, first = begin_from(problem, u, 0.0 * v if stage.static else v, state, force)
         elif reached.static:
             begun, first = release(before, state, problem, earlier=reached.earlier)
         else:
