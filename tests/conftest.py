@@ -157,19 +157,21 @@ def _left_out(item: pytest.Item) -> bool:
 
 
 def _covering(items: list[pytest.Item]) -> set[pytest.Item]:
-    """Of every function, on two ranks so many tests that each value of each parameter occurs, on
-    three, which seldom have a core each, one; of validation, whose parts are tested in the rooms,
-    one on two ranks too, unless ranks are in its name. Their combinations run on one rank, where a
-    law, a scheme or a shape takes the path that it takes on several."""
+    """Of every function one test: the first on two ranks, the last on three, where long ones are
+    left out too. Where ranks are in its name or that of its file, on two so many that each value of
+    each parameter occurs, and on three also what is long. All others run on one rank, where a law,
+    a scheme or a shape takes the path that it takes on several."""
     functions: dict[str, list[pytest.Item]] = {}
     for item in items:
         functions.setdefault(item.nodeid.split("[")[0], []).append(item)
-    if SIZE > 2:  # the last: other values than two ranks begin with
-        return {ones[-1] for ones in functions.values()}
     kept: set[pytest.Item] = set()
-    for ones in functions.values():
-        if "validation" in ones[0].path.parts and "ranks" not in ones[0].name.split("[")[0]:
-            kept.add(ones[-1])
+    for name, ones in functions.items():
+        if SIZE > 2:
+            if "ranks" in name or not ones[-1].get_closest_marker("long"):
+                kept.add(ones[-1])
+            continue
+        if "ranks" not in name:
+            kept.add(ones[0])
             continue
         alike = set.intersection(*map(_parameters, ones)) if len(ones) > 1 else set()
         seen: set[tuple[str, int]] = set()
@@ -256,6 +258,8 @@ def pytest_collectreport(report: pytest.CollectReport) -> None:
 
 def pytest_collection_finish(session: pytest.Session) -> None:
     gc.freeze()  # what was imported stays: the collector need not look at it again and again
+    if "vi_contact.core.timing" in sys.modules:  # small bodies, which free little: 2 % of the time
+        sys.modules["vi_contact.core.timing"]._MALLOC_TRIM = None  # type: ignore[attr-defined]
     _load_forms_once()
     if SIZE == 1:
         return

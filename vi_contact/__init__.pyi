@@ -68,6 +68,7 @@ from .run import LimitLoad as LimitLoad
 from .run import Probe as Probe
 from .run import Racking as Racking
 from .run import Reactions as Reactions
+from .run import ReservoirWater as ReservoirWater
 from .run import Resultants as Resultants
 from .run import RigidBlocks as RigidBlocks
 from .run import RigidLimit as RigidLimit

@@ -135,6 +135,7 @@ def test_qualitative_statements(runs: dict[tuple[float, str], BeamRun]) -> None:
         assert 0.7 < turn < 0.9 and elastic.history["u_tip"][-1] > 0.9
 
 
+@pytest.mark.long
 @pytest.mark.promise("theory/beam.md", "it stays constant within 3e-10 J", bound="2.5e-9 J")
 def test_without_viscosity_and_friction_energy_stays() -> None:
     """V6.1: "an unreasonable increase of the energy" for very small a2 is no property of the
@@ -150,6 +151,7 @@ def test_without_viscosity_and_friction_energy_stays() -> None:
     assert rigid.energy[0] == pytest.approx(23.3384, abs=5e-5)
 
 
+@pytest.mark.long
 def test_counts_of_longer_steps() -> None:
     """V6.1: reading C with dt = 0.005 takes 2.035 and 2.028 passes, the confirming one counted
     (2.0250, 2.0125)."""
@@ -158,6 +160,7 @@ def test_counts_of_longer_steps() -> None:
         assert found.mean_updates + 1.0 == pytest.approx(passes, abs=1e-12)
 
 
+@pytest.mark.long
 def test_published_newton_can_run_away() -> None:
     """Reading B with dt = 0.005: slips are large beside eps. StepFailure names the step; the
     safeguard converges."""
@@ -175,6 +178,7 @@ def test_published_newton_can_run_away() -> None:
     assert found.history["newton"].max() < 20
 
 
+@pytest.mark.long
 @pytest.mark.promise("theory/beam.md", "both give the same results to the last bit")
 def test_safeguard_and_relative_tolerance_change_nothing() -> None:
     """Where the published iteration converges, the safeguarded one goes the same way."""

@@ -70,6 +70,7 @@ def test_turning_points() -> None:
     assert turning_points(-rough, 0.05) == 10
 
 
+@pytest.mark.long
 def test_the_demo(capsys: pytest.CaptureFixture[str]) -> None:
     """JSON has all that the table has; a coarse run has neither numbers of the page nor both
     statements."""

@@ -48,6 +48,7 @@ def algorithm(friction: Any, elements: Elements, dt: float, steps: int, **given:
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "elements", [Elements(50), Elements(50, reduced_shear=False, published_end=True)]
 )
@@ -195,6 +196,7 @@ def test_the_rod_drives_the_friction(rubbing: tuple[Array, Array, Array, float])
         forces(2.0)
 
 
+@pytest.mark.long
 def test_schemes_agree(rubbing: tuple[Array, Array, Array, float]) -> None:
     """Impulses on velocities, whose forces do not ring, move the tip alike."""
     problem = rubbing_problem(

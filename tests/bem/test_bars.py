@@ -48,6 +48,7 @@ def test_a_rod_on_a_stiffer_rod():
     assert found.resultant[:, 1].max() < 2.25 and found.worst < 1e-12
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("ratio", [1.0, 4.0])
 def test_long_runs_stay_bounded(ratio):
     """B5: the rod under the smooth load to t = 60, nothing grows, large steps damp (more:

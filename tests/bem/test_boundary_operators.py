@@ -75,6 +75,7 @@ def test_plane_waves_in_a_disk():
     assert errors[0] < 1.5e-2 and np.log2(errors[0] / errors[1]) > 1.9
 
 
+@pytest.mark.long
 def test_source_in_a_hole():
     """B3: outside of a square hole, driven by the tractions of a point force inside it; order 2."""
     errors = []

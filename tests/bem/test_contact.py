@@ -248,6 +248,7 @@ def test_impact_with_a_gap():
     assert 0.05 < error[1] < 0.09 and error[1] < 0.6 * error[0]
 
 
+@pytest.mark.long
 def test_two_bodies_that_are_mirror_images():
     """B8: a square pressed on its mirror image feels what it feels on a smooth rigid support,
     whatever the friction."""
@@ -308,6 +309,7 @@ def test_a_weld_is_no_cut():
     assert np.abs(here - there).max() < 0.01 * np.abs(there).max()
 
 
+@pytest.mark.long
 def test_part_of_an_interface_is_welded():
     """B8: the right half of the interface welded, the left half in contact: both conditions hold in
     every step."""
@@ -404,6 +406,7 @@ def test_a_third_opinion(law):
         compare_runs(problem, [in_space], solver=vc.Condensed(), dt=0.05, steps=2)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("law", ["none", "Tresca"])
 def test_contact_with_convolution_quadrature(law):
     """The condensed compliance of the other time discretisation serves as well: impulse until t = 4

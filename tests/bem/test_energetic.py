@@ -203,6 +203,7 @@ def test_stable_for_small_and_large_time_steps(ratio):
     assert (motion.work[motion.times > 2.0] < 1.2 * motion.work.max()).all()
 
 
+@pytest.mark.long
 def test_slow_load_is_static():
     """The rod pulled slowly: u_y = p y / (lambda + 2 mu), lambda + 2 mu = 1, to 0.1 %."""
     mesh = polygon(SQUARE, 0.25)
@@ -212,6 +213,7 @@ def test_slow_load_is_static():
     assert motion.work[-1] == pytest.approx(0.5, rel=2e-3)
 
 
+@pytest.mark.long
 def test_a_free_disk_keeps_its_momentum():
     """A push at the lowest point and no support: the mean velocity is impulse / mass."""
     mesh = circle(0.5, 24)

@@ -49,6 +49,7 @@ def warmed(blocks: EnergeticBlocks, history: Callable[[float], float], *, roller
     )
 
 
+@pytest.mark.long
 def test_slow_warming_expands_a_square():
     """u = (1 + nu) eps_0 x from the corner of the rollers in plane strain, so that nothing is left
     of the stress."""

@@ -41,6 +41,7 @@ def test_pulse_crosses_the_square():
     assert errors[1] < 1.5e-2 and np.log2(errors[0] / errors[1]) > 1.8
 
 
+@pytest.mark.long
 def test_rod_inside_and_density():
     """The rod's wave before its echo from the top, at chosen steps; density divides
     displacement."""

@@ -57,6 +57,7 @@ def own(**choice) -> MultiplierMesh:
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("degree", [0, 1])
 def test_the_pairing(degree):
     """B15: B R are the nodal forces of lambda: they do its work on linear displacements, exactly;
@@ -195,6 +196,7 @@ def base_force(**choice) -> np.ndarray:
     return np.asarray(run.resultant[:, 1] / 0.5)
 
 
+@pytest.mark.long
 def test_a_front_inside_of_an_interval():
     """B15: with x = 1/3 of an interval behind the front, exactly: tested at the end lambda is 2 x
     there and then 2; in the mean 2 x², and then 2 (1 +- 2 x (1 - x)) in turn, undamped, although

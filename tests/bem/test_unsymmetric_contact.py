@@ -199,6 +199,7 @@ def test_points_at_rest_are_certified(form):
         )
 
 
+@pytest.mark.long
 def test_corners_and_two_bodies():
     """A box in a notch, whose corner has two conditions, and the square on its mirror image, of
     which one body has the unsymmetric form, rubbing: impulses as with the symmetric form, measured
@@ -225,6 +226,7 @@ def test_corners_and_two_bodies():
         assert 1e-6 < np.abs(other.impulse - one.impulse).max() / np.abs(one.impulse).max() < 5e-3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("form", ["symmetric", "unsymmetric"])
 def test_thin_rod_pressed_on_its_base(form):
     """A rod of h/20 between rollers under a unit step from t = 0, its base free to leave the

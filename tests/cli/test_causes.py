@@ -168,6 +168,7 @@ def shell(line: str, **more: str) -> tuple[int, str, str]:
     return done.returncode, done.stdout, done.stderr
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
 def test_closed_streams_are_no_hindrance(folder: Path, tmp_path: Path, closed: str) -> None:
     """A daemon has none; what libraries print does not get into the files of the run, which would

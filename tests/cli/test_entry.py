@@ -43,6 +43,7 @@ def record(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_help_explains_itself():
     done = shell("--help")
     assert done.returncode == 0 and not done.stderr
@@ -96,6 +97,7 @@ def test_version(capsys):
     assert capsys.readouterr().out == f"vi-contact {vi_contact.__version__}\n"
 
 
+@pytest.mark.long
 def test_motion_info(record):
     done = shell("motion", "info", str(record), "--units", "m/s2")
     assert done.returncode == 0 and not done.stderr

@@ -451,6 +451,7 @@ def test_sentences_name_options_and_not_arguments(
     )
 
 
+@pytest.mark.long
 def test_a_dollar_in_a_title_is_no_formula(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Titles come from files, and matplotlib would read a formula between two dollars, or fail."""
     monkeypatch.chdir(tmp_path)

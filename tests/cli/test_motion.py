@@ -139,6 +139,7 @@ def test_uneven_columns_are_evened_on_request(packet, capsys):
     )
 
 
+@pytest.mark.long
 def test_spectrum_table_and_picture(packet, capsys):
     text = said(
         capsys,
@@ -186,6 +187,7 @@ def test_plot_has_a_default_name(packet, capsys):
     assert (packet / "packet.png").stat().st_size > 4_000
 
 
+@pytest.mark.long
 def test_pictures_of_unusual_records(tmp_path):
     """Silence, and a record of two samples, are drawn without a warning."""
     records = {

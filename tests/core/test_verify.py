@@ -233,6 +233,7 @@ def test_V97_ledger_closes(scheme, damping, impact):
         assert totals["impact"] > 0.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scheme", [HALF, NEWMARK], ids=["zwt", "newmark"])
 @pytest.mark.parametrize("body", [thrown, bouncing, period_three], ids=["V1.1", "V1.2", "V1.3"])
 def test_V97_ledger_closes_for_bars(scheme, body):

@@ -126,6 +126,7 @@ def test_trapezoid_under_an_eccentric_load(comm: Any) -> None:
     assert abs(found["sliding_foot"]) < 1e-9
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_a_block_slides_until_its_speed_is_gone(comm: Any) -> None:
     """v²/(2 mu g) along the floor, nothing left of the friction on the way, all of it

@@ -311,6 +311,7 @@ def rocking(
     return most, first
 
 
+@pytest.mark.long
 def test_housner_free_and_shaken() -> None:
     """Against an integrator with events: free rocking and a block released under a harmonic; 0.1 %
     of angle and time. A slender block has the closed form of the first landing to 0.2 %."""
@@ -343,6 +344,7 @@ def test_housner_free_and_shaken() -> None:
     assert first == pytest.approx(slender.impact_times(0.1, 1)[0], rel=3e-3)
 
 
+@pytest.mark.long
 def test_housner_on_ground_that_rises_or_falls() -> None:
     """A released block under a steady vertical acceleration, as an integrator with events has
     it."""
@@ -365,6 +367,7 @@ def test_housner_on_ground_that_rises_or_falls() -> None:
     assert "does not rock" in Housner(width=3.0, height=4.0).compare(still).applies
 
 
+@pytest.mark.long
 def test_housner_where_it_does_not_apply() -> None:
     """Onset at g b/h; a pulse a little longer than the closed form overturns the block, a shorter
     one does not."""

@@ -116,6 +116,7 @@ def harmonic_amplitude(values, t, f):
     return float(np.hypot(*np.linalg.lstsq(waves, values, rcond=None)[0]))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("f", [1.0, 2.0])
 def test_the_column_answers_like_the_layer(f):
     """V8.2 with stiffness damping, 5 % at this frequency, 30 elements, steady state: 1 %, and 0.5 %
@@ -134,6 +135,7 @@ def test_the_column_answers_like_the_layer(f):
     assert ratio == pytest.approx(float(SoilLayer(30.0, SOIL, xi=0.05).on_rigid_base(f)), rel=1e-2)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("speed, peak", [(1000.0, 3.141), (2000.0, 5.041)])
 def test_the_column_on_rock_answers_like_the_layer(speed, peak):
     """Seismic practice 3.2: largest amplification of an outcrop motion, 20 m on two rocks, damping

@@ -274,6 +274,7 @@ def thrown_block(comm: Any, lumping: float = 0.4) -> vc.ContactProblem:
     )
 
 
+@pytest.mark.long
 def test_a_thrown_block_keeps_its_energy_on_any_number_of_ranks() -> None:
     found = []
     for comm in (COMM, MPI.COMM_SELF):
@@ -289,6 +290,7 @@ def test_a_thrown_block_keeps_its_energy_on_any_number_of_ranks() -> None:
     assert np.allclose(*found, rtol=0.0, atol=1e-8 * found[1].max())
 
 
+@pytest.mark.long
 def test_a_tied_layer_carries_the_same_along_it_on_any_number_of_ranks() -> None:
     """A layer hung over a plane that it presses, tied and pulled along x: reactions that depend on
     y alone."""
@@ -320,6 +322,7 @@ def test_a_tied_layer_carries_the_same_along_it_on_any_number_of_ranks() -> None
     assert np.allclose(*found, rtol=0.0, atol=1e-8 * found[1].max())
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_mass_of_rigid_motions_is_kept() -> None:
     """Redistributed mass has the total mass, centre and inertia of the body and none at the contact
@@ -432,6 +435,7 @@ def test_wrong_uses_are_refused() -> None:
     assert joined.total == 18
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_fields_have_the_pressure_at_all_nodes_of_the_contact(tmp_path: Any) -> None:
     """Vertices have that of their condition, mid-points the mean of two; the Function is the

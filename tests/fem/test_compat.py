@@ -58,6 +58,7 @@ def test_assembled_mass_is_symmetric_and_weighs_the_block(comm):
     assert M.isSymmetric(1e-15)
 
 
+@pytest.mark.long
 def test_without_a_compiler_a_form_is_one_sentence_on_all_ranks(monkeypatch, shared_tmp, comm):
     """And the remedy works: a compiler that CC names. The cache is empty."""
     mesh, _ = fem.build_mesh(BlockMesh(lengths=(1.0,), divisions=(4,)), comm)

@@ -160,6 +160,7 @@ def test_frames_have_the_users_functions(comm: Any, shared_tmp: Path, degree: in
             assert np.abs(file["sigma"][:, 4]).max() > 0.5 * PRESSURE
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_what_frames_cannot_hold(tmp_path: Path) -> None:
     from mpi4py import MPI

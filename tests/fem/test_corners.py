@@ -745,6 +745,7 @@ def tilted_walls() -> tuple[Any, Any]:
     return system, fem.joined_surfaces(*parts)
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_states_of_other_frames_are_refused(tmp_path):
     """Where corners rub, displacements are along the axes: a state in the frames of nodes is

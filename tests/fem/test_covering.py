@@ -69,6 +69,7 @@ def test_uniform_pressure_in_the_plane(beyond, simplices):
     assert seen(surface).weights.sum() == pytest.approx(1.0, rel=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("beyond", "angle", "simplices"),
     [

@@ -181,6 +181,7 @@ def numbered(problem: ContactProblem, B: Array) -> Array:
     return np.ravel(found)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("shape", "n"),
     [

@@ -392,6 +392,7 @@ def test_cells_in_the_order_of_vtk(
         assert np.allclose(sizes, np.prod(lengths) / len(sizes), rtol=1e-12)
 
 
+@pytest.mark.long
 def test_files_do_not_depend_on_the_ranks(comm: Any, shared_tmp: Path) -> None:
     """The frames of all ranks together and of one rank alone: same mesh, same order, fields to
     1e-10."""

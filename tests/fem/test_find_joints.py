@@ -191,6 +191,7 @@ def test_facets_of_a_joint_are_its_sides() -> None:
     np.testing.assert_allclose(joint.ends, [[0.4, 0.0], [0.4, 0.175]], atol=1e-14)
 
 
+@pytest.mark.long
 def test_gaps_are_found_within_what_is_asked() -> None:
     """Heads that are 2 mm open: beds alone, then all; a gap too large does not skip a stone."""
     wall = wall_of(5, 6, head_gap=2e-3, unlike=4)

@@ -298,6 +298,7 @@ def thrown(comm: Any, *material: Any, **body: Any) -> vc.ContactProblem:
     return vc.ContactProblem(with_weight(system), surface, friction=vc.Coulomb(0.4))
 
 
+@pytest.mark.long
 def test_a_thrown_body_stated_by_forms(comm: Any, shared_tmp: Path) -> None:
     """Step by step that of the material; certified to 1e-9, the energy ledger closed; no von Mises
     stress in its fields where no stress is told, and pictures know of it."""
@@ -354,6 +355,7 @@ def leaning(comm: Any) -> tuple[Any, Any]:
     return vc.ContactProblem(system, surface, mass=ConsistentMass()), push
 
 
+@pytest.mark.long
 @pytest.mark.two_ranks
 @pytest.mark.promise("guide/solvers.md", "Both agree to 1e-8 on a block whose stiffness")
 def test_stiffness_that_is_not_symmetric(comm: Any) -> None:

@@ -128,6 +128,7 @@ def test_tags_and_markers_name_what_gmsh_names(cell):
         assert np.array_equal(first, second), name
 
 
+@pytest.mark.long
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("ghosts", ["none", "shared_facet"])
 def test_parts_and_refinements_of_meshes(ghosts, shared_tmp):
@@ -218,6 +219,7 @@ def checkered(comm: Any, ghosts: str, owned: bool) -> tuple[Any, Any, Any]:
     return mesh, fem.Cells.tagged("dark", tags, 0, mesh), fem.Cells.tagged("light", tags, 1, mesh)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("degree", [1, 2])
 def test_the_later_pair_of_initial_values_counts_where_cells_meet(degree):
     """A chessboard, of which some nodes touch light cells on other ranks only; with tags of ghosts

@@ -232,6 +232,7 @@ def warmed_bar(n: int, gap: float) -> ContactProblem:
     return ContactProblem(system, fem.contact_surface(system, tags["right"], obstacle=wall))
 
 
+@pytest.mark.long
 @pytest.mark.serial
 @pytest.mark.promise(
     "guide/bring_your_own.md",

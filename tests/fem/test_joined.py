@@ -209,6 +209,7 @@ def test_a_block_thrown_into_a_corner(scheme):
     assert np.any(active[:, corner].all(axis=1)) and not active.all()
 
 
+@pytest.mark.long
 @pytest.mark.two_ranks
 def test_a_turned_corner_is_the_same():
     """With consistent mass; redistributed mass depends on the axes (0.1 to 3 % of the forces
@@ -247,6 +248,7 @@ def test_what_surfaces_know_is_kept():
         )
 
 
+@pytest.mark.long
 def test_redistributed_mass_at_corners():
     """No inertia on any contact unknown, that of the edge included; each body keeps its mass."""
     mesh = blocks(3, angle=0.4, upper=(6, 5, 5), lower=(6, 4, 5))

@@ -77,6 +77,7 @@ def crack_base(solver: str, alone: bool = False) -> Any:
     return march_block(MPI.COMM_SELF if alone else MPI.COMM_WORLD, BASE, SOLVERS[solver])
 
 
+@pytest.mark.long
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_the_base_of_a_block_cracks(solver: str) -> None:
@@ -98,6 +99,7 @@ def test_the_base_of_a_block_cracks(solver: str) -> None:
     assert run.history["loss_fracture"][-1] == pytest.approx(taken, rel=0.05)
 
 
+@pytest.mark.long
 def test_elements_that_are_too_long_for_the_joint_are_told(comm: Any) -> None:
     """E dc/(4 f_t) is 2.5 m and 0.5 m, and elements are 4/3 m; of the fault, a third of
     mu* dc/(sigma (mu_s - mu_d)) is 390 m, and its barriers, which hold, are left out."""
@@ -133,6 +135,7 @@ def test_ranks_change_nothing(solver: str) -> None:
         assert np.max(np.abs(ours - alone)) <= 10.0 * tolerance * np.max(np.abs(alone)), name
 
 
+@pytest.mark.long
 @pytest.mark.two_ranks
 def test_a_restart_on_these_ranks_is_the_straight_run(comm: Any, shared_tmp: Any) -> None:
     """Committed arrays are stored by the numbers of the conditions."""
@@ -167,12 +170,14 @@ def test_values_by_functions_and_tables_are_the_same(comm: Any) -> None:
     first = block(comm, replace(BASE, tension=weak))
     surface = first.surface
     table = tuple(surface.everywhere(weak(surface.points)).tolist())
-    second = block(comm, replace(BASE, tension=table))
+    # on the same mesh: a graph partition may cut an equal one in another way
+    second = replace(first, joint=replace(BASE, tension=table))
     assert first.joint == second.joint
     with pytest.raises(InputError, match=r"tension returns .* for \d+ points"):
         block(comm, replace(BASE, tension=lambda x: np.ones(len(x) + 1)))
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_dilatancy_lifts_what_slides(comm: Any) -> None:
     """A block pushed over its base rises by tan(psi) times the slip, and the parts add up."""
@@ -192,7 +197,8 @@ def test_dilatancy_lifts_what_slides(comm: Any) -> None:
     assert run.history["loss_dilatancy"][-1] < 0.0
 
 
-@pytest.mark.two_ranks
+@pytest.mark.long
+@pytest.mark.serial  # ranks: the block whose base cracks
 def test_mixed_mode_loses_both_strengths(comm: Any) -> None:
     """A block that is pushed over a joint without friction loses its cohesion and its tension."""
     joint = laws.Joint(cohesion=1e5, tension=1e5, energy=50.0)
@@ -206,6 +212,7 @@ def test_mixed_mode_loses_both_strengths(comm: Any) -> None:
     assert rubbed == pytest.approx(50.0 * 16.0, rel=0.05)
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_a_rupture_runs_along_a_fault(comm: Any) -> None:
     """h = 500 m: arrival at 9 km at 2.563 s as an independent program has it on this mesh; the work
@@ -246,6 +253,7 @@ def test_a_rupture_runs_along_a_fault(comm: Any) -> None:
     assert row["loss_rubbing"] - row["work_prestress"] == pytest.approx(both, rel=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.serial
 @pytest.mark.parametrize(
     "joint",
@@ -289,6 +297,7 @@ def test_a_block_in_space_breaks_loose(comm: Any, joint: Any) -> None:
     assert rubbed[1] == pytest.approx(rubbed[0], rel=1e-7)
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_mortar_and_node_to_node_rupture_alike(comm: Any) -> None:
     """The largest slip on matching meshes, which the two take from the same forces, to 1e-9."""

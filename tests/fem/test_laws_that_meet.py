@@ -45,6 +45,7 @@ def throw_until_it_yields() -> tuple[vc.ContactProblem, vc.State]:
     return problem, state
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scheme", [vc.Midpoint(), vc.Trapezoidal(), vc.Newmark(), vc.HHT()])
 def test_all_ways_to_march_keep_what_materials_remember(scheme: Any) -> None:
     """Schemes replace the memory of a state at their start; that of materials stays."""
@@ -75,6 +76,7 @@ def test_a_joint_that_has_cracked_stays_cracked_after_a_release() -> None:
     assert np.array_equal(first.memory["joint_kappa"], marks["joint_kappa"])
 
 
+@pytest.mark.long
 def test_passes_that_do_not_settle_go_on_as_whole_steps() -> None:
     """A block that is torn off by one step, which Volume could do and Condensed could not."""
     joint = laws.Joint(mu=0.6, cohesion=1e5, tension=5e4, opening=1e-3)
@@ -86,6 +88,7 @@ def test_passes_that_do_not_settle_go_on_as_whole_steps() -> None:
     assert np.allclose(ends[0], ends[1], rtol=0.0, atol=1e-6 * np.abs(ends[1]).max())
 
 
+@pytest.mark.long
 def test_a_joint_of_a_bonded_wall_cracks() -> None:
     """Conditions that share unknowns: the forces of the joint are its own, not read off a load."""
     wall = MasonryMesh(stones=2, courses=2, ground=0.2, divisions=(4, 2))

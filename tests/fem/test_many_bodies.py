@@ -107,7 +107,7 @@ def bond(
     return system, ContactProblem(system, surface, friction=vc.Coulomb(MU))
 
 
-@pytest.mark.two_ranks
+@pytest.mark.serial  # ranks: the shaken wall, of the same stones
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("unlike", [False, True], ids=["nodes", "mortar"])
 def test_stones_in_running_bond_press_alike(d, unlike):
@@ -125,6 +125,7 @@ def test_stones_in_running_bond_press_alike(d, unlike):
     assert state.certificate <= 1e-9
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_a_mirrored_wall_has_mirrored_forces():
     """A softer stone on the left and a push to the right, and the other way round: the forces are
@@ -165,6 +166,7 @@ def shaken(ranks_of: Any = None) -> tuple[Any, list[Any]]:
     return problem, [report for _, report in vc.march(problem, dt=5e-4, steps=30)]
 
 
+@pytest.mark.long
 @pytest.mark.two_ranks
 def test_the_ledger_of_a_shaken_wall_closes():
     """Rings, contact nodes without mass, slip and uplift: every step is certified and its energy
@@ -248,6 +250,7 @@ def test_pyramid_of_ten_stones_on_pads():
     assert weights[20:] == pytest.approx(by_hand, rel=1e-8)
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_a_block_cut_from_its_ground_is_lifted_off(tmp_path):
     """Case 02: both are drawn between the same corner points. Cut apart the block of 47 kN is
@@ -286,6 +289,7 @@ Physical Curve("rock") = {13}; Physical Curve("top") = {3};
 """
 
 
+@pytest.mark.long
 @pytest.mark.serial
 @pytest.mark.parametrize(("mu", "limit"), [(0.7, 0.5), (0.3, 0.3)], ids=["topples", "slides"])
 def test_a_stack_that_tilts(mu, limit):
@@ -513,6 +517,7 @@ CONSISTENT = {"mass": vc.ConsistentMass(), "impact": vc.Inelastic()}
 IMPULSES = {"mass": vc.ConsistentMass(), "impact": vc.Newton(0.3, vc.ImpulseUpdate())}
 
 
+@pytest.mark.long
 @pytest.mark.two_ranks
 @pytest.mark.parametrize(
     ("law", "how"),
@@ -704,6 +709,7 @@ def test_conditions_as_traces_are_the_same_conditions(scheme):
         assert np.abs(functions[0] - functions[1]).max() < 1e-7 * scale
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_a_restart_goes_on_bit_for_bit():
     """A wall of rings that is stopped after six steps goes on as if it had not been."""

@@ -378,6 +378,7 @@ def sliding(comm: Any, turn: int, mu: float) -> ContactProblem:
     return replace(problem, system=system)
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_a_block_slides_down_a_plane_alike_in_any_orientation():
     """Displacements and forces turned back are the same to 1e-9, on all ranks together as on each

@@ -391,6 +391,7 @@ def test_loads_with_histories_lose_the_clamped_rows():
     )
 
 
+@pytest.mark.long
 def test_restart_is_the_straight_run(tmp_path):
     system = beam(v0=np.tile([0.1, -1.0, 0.0], 7))
     surface = vc.contact_points(system, [6, 3], [0.3, -1.0], gap0=0.002)

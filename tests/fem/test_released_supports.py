@@ -46,6 +46,7 @@ def stages(
     return static, state, dynamic, [(0.0, 4.0), (3.0, 4.0), (6.0, 2.0)]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("friction", [None, pytest.param(vc.Coulomb(0.3), marks=pytest.mark.slow)])
 def test_nothing_moves_after_the_release(comm, friction):
     """One second without motion: still to 1e-12 of the static displacement, contact forces too."""
@@ -205,6 +206,7 @@ def block_on_soil(
     return static, vc.static_equilibrium(static, solver=solver), dynamic
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "held, solver, friction, simplices",
     [

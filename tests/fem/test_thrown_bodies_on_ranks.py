@@ -13,6 +13,7 @@ from thrown_blocks import status, thrown_blocks
 import vi_contact as vc
 
 
+@pytest.mark.long
 def test_the_same_sets_on_any_number_of_ranks():
     """Two blocks with curved faces that do not match, from the first touch: all ranks together and
     each alone have the same points open, sticking and slipping in every step, and the same

@@ -123,6 +123,7 @@ def test_a_bar_is_pulled(comm: Any, pull: float) -> None:
     assert end == pytest.approx(stretch - 1.0, rel=1e-8)
 
 
+@pytest.mark.long
 def test_a_cantilever_bends_far(comm: Any) -> None:
     """The elastica: half the length down. Shear and stretch of a beam 1:50 are 1e-3 of it."""
     h = 0.02
@@ -178,6 +179,7 @@ def test_what_resists_rotation_is_refused() -> None:
         fem.contact_surface(linear, obstacle=vc.HalfSpace((0.0, 0.0), (0.0, 1.0)))
 
 
+@pytest.mark.long
 def test_two_materials_share_a_body(comm: Any) -> None:
     """One law in two groups of cells is one law."""
     mesh, tags = bar(comm, 1.0, 0.5)

@@ -55,6 +55,7 @@ def read(folder: Path) -> list[Any]:
         return [series.read_frame(i) for i in range(len(series.times))]
 
 
+@pytest.mark.long
 def test_numbers_are_those_of_xdmf(comm: Any, shared_tmp: Path) -> None:
     """Mesh, times and every array of every frame, bit by bit, in the order of the input mesh; a
     piece for each rank with cells, and every cell in one."""
@@ -79,6 +80,7 @@ def test_numbers_are_those_of_xdmf(comm: Any, shared_tmp: Path) -> None:
     assert np.array_equal(numbers, np.arange(len(found[0]["cells"])))
 
 
+@pytest.mark.long
 def test_other_readers_take_it(comm: Any, shared_tmp: Path) -> None:
     """A frame as a Function, also at a time; and the frames of the pictures."""
     problem = rough_wall(comm)
@@ -129,6 +131,7 @@ def test_restart_is_the_straight_run(comm: Any, shared_tmp: Path) -> None:
     assert list_steps(folder) == [0, 2]
 
 
+@pytest.mark.long
 def test_own_functions(comm: Any, shared_tmp: Path) -> None:
     """Numbers in cells, vectors at nodes and a tensor that a function of the state returns; after a
     restart one is gone, and another is new: what a frame has not is NaN there."""

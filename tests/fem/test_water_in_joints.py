@@ -44,6 +44,7 @@ def read(problem: vc.ContactProblem, state: vc.State) -> dict[str, Any]:
     return vc.Uplift().start(problem, state)
 
 
+@pytest.mark.long
 def test_the_crack_is_that_of_the_usual_rule(comm: Any) -> None:
     """c = 3 (M_toe - p B²/2)/(W - p B) uncracked; order 2 in the cells."""
     p = GAMMA * HEIGHT
@@ -147,6 +148,7 @@ def march(problem: vc.ContactProblem, **others: Any) -> Any:
     return vc.simulate(problem, **(settings | others))
 
 
+@pytest.mark.long
 def test_water_in_time_closes_the_ledger_on_all_ranks(comm: Any) -> None:
     """Water rises and enters what opens: certified, its work booked; ranks alike."""
     problem = dam(comm, RISING)
@@ -168,6 +170,7 @@ def test_water_in_time_closes_the_ledger_on_all_ranks(comm: Any) -> None:
         assert np.abs(history[name] - one[name]).max() < 1e-8 * np.abs(one[name]).max()
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_the_uplift_of_a_dam_that_cracks(comm: Any) -> None:
     """3234.0 kN/m within 1e-3, of an independent program with the water in the loop (2 ms)."""
@@ -182,6 +185,7 @@ def test_the_uplift_of_a_dam_that_cracks(comm: Any) -> None:
     assert history["certificate"].max() < 1e-9
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("quake", ["follows", "none"])
 def test_a_restart_is_the_straight_run(comm: Any, shared_tmp: Any, quake: str) -> None:
     """The pressures of the last rest and of the last step are stored."""
@@ -195,6 +199,8 @@ def test_a_restart_is_the_straight_run(comm: Any, shared_tmp: Any, quake: str) -
         assert again[name][-1] == pytest.approx(straight[name][-1], abs=1e-10 * scale)
 
 
+@pytest.mark.long
+@pytest.mark.serial  # ranks: the restart has both
 def test_an_earthquake_keeps_water_or_none(comm: Any) -> None:
     """kept: p B/2 all the time; none: nothing in what has opened, so less."""
     uplift = {}

@@ -87,6 +87,7 @@ def throw_block(body: str, contact: str) -> vc.ContactProblem:
     return vc.ContactProblem(system, surface, mass=vc.ConsistentMass(), **CONTACTS[contact])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("contact", CONTACTS)
 @pytest.mark.parametrize("body", BODIES)
 def test_each_runs_or_is_refused(body: str, contact: str) -> None:

@@ -12,7 +12,6 @@ import vi_contact as vc
 from vi_contact import fem
 from vi_contact.core.algebra import largest, max_abs
 from vi_contact.core.errors import InputError
-from vi_contact.core.surfaces import empty_surface
 from vi_contact.laws import J2, DruckerPrager, Iwan, LinearElastic, MohrCoulomb, Orthotropic
 from vi_contact.laws.mandel import ROOT
 from vi_contact.laws.yielding import YieldingMaterial
@@ -274,14 +273,3 @@ def test_iwan_has_the_stiffness_of_its_table(comm: Any) -> None:
     internal: Any = system.internal
     u = wave(system, 1e-9)
     assert apart(system, internal.force(u), system.K @ u) <= 1e-12
-
-
-@pytest.mark.serial
-def test_what_a_displacement_does_not_tell_is_refused(comm: Any) -> None:
-    """Reactions of supports and section forces: sentences, and no numbers of the elastic body."""
-    mesh, tags, _ = block(comm)
-    system = fem.assemble(mesh, METAL, integration="bbar", clamped=tags["bottom"])
-    problem = vc.ContactProblem(system, empty_surface(system.space.comm, 2))
-    reactions = vc.Reactions("base", tags["bottom"], centre=(0.0, 0.0))
-    with pytest.raises(InputError, match="is not linear"):
-        vc.simulate(problem, dt=1e-4, steps=1, record=[reactions], progress=False)

@@ -99,6 +99,7 @@ def test_weaker_laws() -> None:
         Iwan(1e7, 0.3, 2000.0, LOOP).weaken(2.0)
 
 
+@pytest.mark.long
 @pytest.mark.two_ranks
 def test_frames_have_what_points_tell(comm: Any, shared_tmp: Path) -> None:
     """XDMF and VTKHDF: the same means of cells, of as many as the body has, from the memory."""
@@ -216,6 +217,7 @@ def test_masings_damping_of_a_hyperbola(amplitude: float, exact: float) -> None:
     assert found.stiffness[-1] == pytest.approx(1e7 / (1.0 + amplitude), rel=0.01)
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_strains_and_stresses_are_computed_once_a_displacement(
     comm: Any, monkeypatch: pytest.MonkeyPatch

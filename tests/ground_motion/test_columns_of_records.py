@@ -96,6 +96,7 @@ def test_the_command_takes_a_name(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert "pass --channel" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_a_doubt_is_printed_as_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = "".join(f"{20 * k} {value:.4f}\n" for k, value in enumerate(V))
     record = read_record(write(tmp_path, text), "g", dt=0.02)

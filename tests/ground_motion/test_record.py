@@ -137,6 +137,7 @@ def test_record_info_of_el_centro():
         assert line in text.splitlines()
 
 
+@pytest.mark.long
 def test_record_info_lists_every_quantity(tmp_path):
     path = tmp_path / "motion.txt"
     path.write_text("# my record\n0.0 0.0\n0.1 1.0\n0.2 -2.0\n0.3 1.0\n0.4 0.0\n")

@@ -67,6 +67,7 @@ def test_one_step_is_the_matrix_exponential(zeta, omega):
     assert np.all(np.abs(_move(factors, u, v, a0, a1)[:, 0] - wanted) < 1e-13 * size)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("dt", [0.5, 0.1, 0.01])
 def test_rectangular_pulse_has_its_shock_spectrum(dt):
     """Undamped: SD = 2 a/omega² for t0 >= T/2, else 2 a/omega² sin(pi t0/T), reached after the

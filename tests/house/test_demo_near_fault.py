@@ -10,6 +10,7 @@ from demo_runs import demo
 pytest.importorskip("dolfinx")
 
 
+@pytest.mark.serial  # ranks: test_demos runs the wall demo on them
 def test_near_fault(comm: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """The elastic block differs from the rigid one by its shear and by half a time step,
     together 0.6 %."""

@@ -287,6 +287,7 @@ def test_masings_loops(amplitude: float, n: int) -> None:
     assert enclosed / (2.0 * np.pi * top * amplitude) == pytest.approx(damping, rel=1e-3)
 
 
+@pytest.mark.long
 def test_masing_damping_of_the_hyperbola() -> None:
     """A fine table of G/Gmax = 1/(1 + gamma/r) has the damping of the curve, .22414209 at 2 r."""
     r = 1e-3

@@ -39,6 +39,7 @@ def collide(layer: Layer, **more) -> LayerContact:
     return layer_motion(PLANE, layer, **settings).contacts[0]
 
 
+@pytest.mark.long
 @pytest.mark.promise(
     "theory/boundary_layer.md", "differs from the closed form by 3e-10", bound="1e-9"
 )
@@ -59,6 +60,7 @@ def test_particle():
             assert found.turned == pytest.approx(impact.compression_time, abs=1e-9)
 
 
+@pytest.mark.long
 def test_cut_off_changes_duration_not_restitution():
     """V5.1: x(0) = b, k = c = b = 1; a/b from 0.8 to 1."""
     expected = {
@@ -74,6 +76,7 @@ def test_cut_off_changes_duration_not_restitution():
         assert (found.duration, found.deepest) == pytest.approx((duration, deepest), abs=5.1e-6)
 
 
+@pytest.mark.long
 def test_full_metric():
     """V5.1: g_11 + ĝ_11 in the place of the dominant term; the blended reading is its limit a ->
     b."""
@@ -112,6 +115,7 @@ def test_any_coordinates_any_mass_matrix():
     assert jacobian(motion.q[-1]) @ motion.v[-1] == pytest.approx([0.593624260040, 0.3], abs=1e-8)
 
 
+@pytest.mark.long
 def test_events_flight_and_several_contacts():
     """A ball falls from 1 m on a thin layer of e = ½ and bounces: times and speeds of the point
     mass, less O(b)."""

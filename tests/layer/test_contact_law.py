@@ -138,6 +138,7 @@ def test_energy_of_potential_and_damper():
     assert abs(lost[1.0]) < 1e-10 * 500.0 and lost[0.3] > 1.0
 
 
+@pytest.mark.long
 @serial
 def test_steps_larger_than_the_layer():
     """The gap stays open and nothing explodes however large the step: V dt = b to 100 b."""

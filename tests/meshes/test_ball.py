@@ -71,6 +71,7 @@ def test_foot_is_the_fine_part_of_the_surface():
     assert np.median(length[far] / wanted[far]) == pytest.approx(1.1, rel=0.2)
 
 
+@pytest.mark.long
 def test_ball_is_written_the_same_every_time_and_read_back(tmp_path):
     ball = BallMesh(**SMALL, eighth=True)
     write(ball, tmp_path / "one.msh")

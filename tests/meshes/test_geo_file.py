@@ -76,6 +76,7 @@ def test_a_wall_is_meshed(tmp_path: Path) -> None:
     assert sorted(one.name for one in tmp_path.iterdir()) == ["wall.geo"]
 
 
+@pytest.mark.long
 def test_bodies_in_space_are_meshed(tmp_path: Path) -> None:
     text = BOX.replace("Surface In BoundingBox {-1, -1, -0.1, 3, 2, 0.1}", "{5}")
     path = written(tmp_path, f"{text}MeshSize{{:}} = 1;")
@@ -234,6 +235,7 @@ Physical Surface("dam", 101) = {1}; Physical Line("base", 201) = {1};
     assert not (tmp_path / "dam.msh").exists()
 
 
+@pytest.mark.long
 def test_a_surface_that_cannot_be_transfinite_is_meshed_freely(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -492,6 +494,7 @@ def test_loops_go_round_however_lines_end(tmp_path: Path, text: str) -> None:
         assert len(gmsh.model.getEntities(0)) == LOOPS[text]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("groups", "said"),
     [
@@ -514,6 +517,7 @@ def test_groups_that_gmsh_would_cut_are_refused(tmp_path: Path, groups: str, sai
         arrays_of(GeoFile(path=path))
 
 
+@pytest.mark.long
 def test_groups_are_what_their_lists_say(tmp_path: Path) -> None:
     """All kinds of lists; groups of branches that are not taken are none; in loops they grow."""
     groups = """Physical Curve("all") = Curve{:};

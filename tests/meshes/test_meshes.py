@@ -236,6 +236,7 @@ def run(*arguments, cwd):
     )
 
 
+@pytest.mark.long
 def test_the_folder_of_the_source_tree_writes_meshes_without_installation(tmp_path):
     options = ["--height", 4, "--width", 2, "--divisions", 2, 4, "--triangles", "-o", "wall.msh"]
     done = run(SOURCE_TREE / "meshes", "wall", *options, cwd=tmp_path)
@@ -245,6 +246,7 @@ def test_the_folder_of_the_source_tree_writes_meshes_without_installation(tmp_pa
     assert np.array_equal(wall.points.max(axis=0), [2.0, 4.0])
 
 
+@pytest.mark.long
 def test_it_runs_as_a_module(tmp_path):
     options = [
         "--lengths",
@@ -278,6 +280,7 @@ def test_every_number_of_a_shape_is_an_option(shape: str, capsys):
         ) or f"--{field.name.replace('_', '-')} " in said.replace("]", " ")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "shape, words, kind",
     [
@@ -298,6 +301,7 @@ def test_every_shape_is_a_command(shape: str, words: str, kind: str, tmp_path):
     assert arrays_from_file(tmp_path / "it.msh").cell == kind
 
 
+@pytest.mark.long
 def test_meshes_explain_bad_input_in_one_line(tmp_path):
     for words, said in (
         (("wall", "--size", -1), "cell size is -1.0 m: give one above 0 and up to the wall's"),

@@ -265,6 +265,7 @@ def test_records_of_both_sides():
         )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("friction", [None, FRICTION], ids=["sliding", "rubbing"])
 def test_any_number_of_ranks(friction):
     """The same run on all ranks together and on each alone, to 1e-10 of the largest displacement
@@ -380,6 +381,7 @@ def on_base(base, ends, shaking, *, dt, steps, weighing=BODIES, rock=None, hht=F
     return problem, solution.history
 
 
+@pytest.mark.long
 @serial
 @pytest.mark.parametrize(
     "ends, hht", [(TiedSides, True), (FreeFieldSides, False), (DashpotSides, False)]

@@ -64,6 +64,7 @@ def test_restart_to_the_last_bit(tmp_path: Path, scheme: Any, impact: Any) -> No
     assert straight.history["loss_impact"][-1] != 0.0 and straight.history["loss_contact"][-1] > 0.0
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_restart_from_before_the_last_row(tmp_path: Path) -> None:
     """Steps after the checkpoint are dropped and computed again."""
@@ -76,6 +77,7 @@ def test_restart_from_before_the_last_row(tmp_path: Path) -> None:
     assert equal_files(tmp_path, tmp_path / "straight")
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_restart_into_another_folder(tmp_path: Path) -> None:
     """The old folder stays as it was, the new one holds the whole history; so does a solution
@@ -90,6 +92,7 @@ def test_restart_into_another_folder(tmp_path: Path) -> None:
     assert difference(alone.state, straight.state) == 0.0 and len(alone.history["t"]) == 251
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_restart_of_a_finished_run(tmp_path: Path) -> None:
     """Nothing is left to do: the same solution. t_end counts from the start of the whole run, to
@@ -101,6 +104,7 @@ def test_restart_of_a_finished_run(tmp_path: Path) -> None:
     assert longer.state.k == 410 and len(longer.history["t"]) == 411
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_start_with_a_step_number(tmp_path: Path) -> None:
     """A run that began at another step and time restarts like any other."""
@@ -236,6 +240,7 @@ def test_restart_with_friction_on_the_same_ranks(
     assert comm.size > 1 or equal_files(shared_tmp / "parts", shared_tmp / "straight")
 
 
+@pytest.mark.long
 def test_arrays_of_many_points_are_gathered_on_one_rank(
     comm: Any, shared_tmp: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -287,6 +292,7 @@ def test_restart_with_another_mass_matrix_is_refused(comm: Any, shared_tmp: Path
     )
 
 
+@pytest.mark.long
 @pytest.mark.promise("guide/clusters.md", "Results then agree to round-off")
 def test_restart_on_another_number_of_ranks(comm: Any, shared_tmp: Path) -> None:
     """A checkpoint of one rank goes on on all of them, and one of all of them on one: the histories

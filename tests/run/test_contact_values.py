@@ -94,6 +94,7 @@ def test_a_state_of_another_problem_is_refused(comm: Any) -> None:
         vc.contact_values(alone, None)  # type: ignore[arg-type]
 
 
+@pytest.mark.long
 def test_summary_tells_how_much_of_the_friction_is_used(comm: Any) -> None:
     """A block on a plane that is pushed by 0.6 mu N sticks as a whole, by 1.5 mu N slides as a
     whole: T/(mu N) and the share of slipping points, in history, facts and summary."""

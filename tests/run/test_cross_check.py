@@ -194,6 +194,7 @@ class HalfTheFriction(Off):
         return Prepared()
 
 
+@pytest.mark.long
 def test_friction_is_compared():
     """r_t counts where there is friction, at its own size, and is in the report; missing is wrong
     by as much as all."""

@@ -204,6 +204,7 @@ def without_ratios(text: str) -> str:
     return "\n".join(line for line in text.splitlines() if not line.startswith("xi"))
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_check_and_summary_print_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, out = str(written(tmp_path)), tmp_path / "out"

@@ -186,6 +186,7 @@ def mutated(data: bytes, dice: Dice) -> tuple[bytes, bool]:
 # --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.fuzz
 def test_checkpoints(sound: Path, tmp_path: Path) -> None:
     """160 of them. Where a checksum was forged, numbers may be others, but are finite and of the

@@ -48,6 +48,7 @@ def stack(k: int = 4) -> meshes.BricksMesh:
     )
 
 
+@pytest.mark.long
 @pytest.mark.two_ranks
 @pytest.mark.parametrize(("mu", "limit"), [(0.7, 0.5), (0.3, 0.3)], ids=["topples", "slides"])
 def test_a_stack_tilts_until_it_first_moves(mu: float, limit: float) -> None:
@@ -84,6 +85,7 @@ def test_a_stack_tilts_until_it_first_moves(mu: float, limit: float) -> None:
     assert np.abs(moved - expected)[stones].max(initial=0.0) < 1e-3
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_a_push_is_no_more_than_the_bound(tmp_path: Any) -> None:
     """Half stones below a whole one, T joint and all: at most the bound of associated flow, from
@@ -105,6 +107,7 @@ def test_a_push_is_no_more_than_the_bound(tmp_path: Any) -> None:
         vc.limit_load(problem, force=(GRAVITY, 0.0), first=0.25, rtol=0.9, bound=lower)
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_forces_on_unknowns_push_one_stone() -> None:
     """The lower of two stones, pushed alone, slides below the other at mu times the weights above

@@ -172,6 +172,7 @@ def test_reports_hold_what_reports_of_march_hold(steps_together):
         assert after.old is before.new
 
 
+@pytest.mark.long
 @pytest.mark.two_ranks
 def test_the_order_of_the_runs_does_not_matter():
     forwards, _ = run(SHAKEN)

@@ -80,6 +80,7 @@ def test_a_linear_force_is_the_linear_body() -> None:
     assert any(report.new.active.any() for report in runs[0])
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_passes_and_tangents_are_few() -> None:
     stepper = Stepper(make_chain(), scheme=vc.Midpoint(), solver=vc.Condensed())
@@ -212,6 +213,7 @@ def test_a_pass_that_goes_too_far_is_shortened(most: float) -> None:
     assert state.u[-1] == pytest.approx(roots[np.isreal(roots)].real[0], rel=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_bodies_of_many_runs_that_are_not_linear_go_alone() -> None:
     """Each run is what it is by itself, to the last bit."""
@@ -249,6 +251,7 @@ def test_a_tangent_of_another_shape_is_refused() -> None:
         wrong.tangent(np.zeros(ELEMENTS + 1))
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_the_boundary_layer_is_for_linear_bodies() -> None:
     law = contact_layer(0.5, mass=2.0, speed=3.0, width=0.005)

@@ -282,6 +282,7 @@ def test_checksum_sees_everything() -> None:
 # --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_other_ranks_are_the_same_problem(comm: Any) -> None:
     """All numbers agree with those of one rank, far below what counts as a difference."""
     pytest.importorskip("dolfinx")
@@ -316,6 +317,7 @@ def test_other_ranks_are_the_same_problem(comm: Any) -> None:
                 assert abs(a - b) <= 1e-11 * size, name
 
 
+@pytest.mark.long
 def test_another_material_is_refused_on_all_ranks(comm: Any, shared_tmp: Path) -> None:
     """Other Young's modulus, other friction, and a law of one's own whose text says nothing."""
     pytest.importorskip("dolfinx")
@@ -376,6 +378,7 @@ def joint_facts(mu: float, opening: float, normal: float, first: int) -> dict[st
     return identify(problem, ZienkiewiczWoodTaylor(), 1e-3, start=0.0, end=1.0)
 
 
+@pytest.mark.long
 @serial
 @pytest.mark.parametrize("name", JOINTS)
 def test_joints_of_parts_are_told_by_their_values(name: str) -> None:

@@ -58,6 +58,7 @@ def alike(ours, theirs):
     )
 
 
+@pytest.mark.long
 def test_every_run_leaves_what_it_leaves_alone(shared_tmp):
     """Histories, summaries and logs are each run's own, also where one ends before the others."""
     asked = runs(shared_tmp / "many")

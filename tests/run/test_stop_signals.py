@@ -211,6 +211,7 @@ def another_run(out: Path) -> Iterator[subprocess.Popen[bytes]]:
         child.communicate()
 
 
+@pytest.mark.long
 @serial
 def test_two_runs_into_one_folder(tmp_path: Path) -> None:
     """The second is refused and changes nothing; the first is whole; killed, it holds nobody up."""

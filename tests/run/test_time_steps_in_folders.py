@@ -96,6 +96,7 @@ class Stop(Exception):
     """The end of a run by force."""
 
 
+@pytest.mark.long
 @serial
 @pytest.mark.parametrize("scheme", [HALF, DISSIPATIVE], ids=repr)
 def test_a_run_that_stops_inside_a_halved_step_goes_on_from_the_base_step_before(
@@ -167,6 +168,7 @@ def test_another_plan_is_refused(tmp_path: Path):
 # any number of ranks
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("solver", ["condensed", pytest.param("volume", marks=pytest.mark.slow)])
 def test_halved_wall_on_any_number_of_ranks(comm: Any, shared_tmp: Path, solver: str):
     """All ranks halve the same steps; the restart is the straight run, with factors of four dts."""

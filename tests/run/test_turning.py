@@ -54,7 +54,8 @@ def follow(problem: vc.ContactProblem, dt: Any, **more: Any) -> tuple[Any, float
     return state, energy, momenta
 
 
-@pytest.mark.two_ranks
+@pytest.mark.long
+@pytest.mark.serial  # ranks: the box tumbles on them
 @pytest.mark.parametrize(("E", "turns"), [(1e6, 10), (1e8, 2)])
 def test_ten_turns_keep_energy_and_spin(comm: Any, E: float, turns: int) -> None:
     """At 20 steps a turn. Round-off of the forces adds up: it grows with E."""
@@ -64,6 +65,7 @@ def test_ten_turns_keep_energy_and_spin(comm: Any, E: float, turns: int) -> None
     assert momenta < 1e-10
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_the_trapezoidal_rule_blows_up_in_three_turns(comm: Any) -> None:
     """The same block, mass and step length, without the force of both ends."""
@@ -83,6 +85,7 @@ def test_the_trapezoidal_rule_blows_up_in_three_turns(comm: Any) -> None:
     assert grown > 1.5
 
 
+@pytest.mark.long
 @pytest.mark.two_ranks
 def test_a_turned_start_gives_a_turned_run(comm: Any) -> None:
     """No axis of space is better than another, at any strain."""
@@ -105,6 +108,7 @@ def test_a_turned_start_gives_a_turned_run(comm: Any) -> None:
     assert off < 1e-10
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("simplices", [False, True])
 def test_a_box_tumbles_in_space(comm: Any, simplices: bool) -> None:
     """About no axis of inertia, of rubber: the spin vector is kept while the box tumbles."""
@@ -139,6 +143,7 @@ def test_drag_slows_a_flight_down_by_its_own_rate(comm: Any) -> None:
     assert found[-1][2] / found[0][2] == pytest.approx(kept, rel=1e-3)
 
 
+@pytest.mark.long
 @pytest.mark.two_ranks
 @pytest.mark.parametrize(
     ("width", "theta0", "off"),
@@ -175,6 +180,7 @@ def test_a_block_rocks_as_the_rigid_one(comm: Any, width: float, theta0: float, 
     assert landing == pytest.approx(quarter, rel=off)
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_a_column_falls_over_and_lies(comm: Any) -> None:
     """Beside the rigid block's equation until it lands; its side comes to rest on the floor, and
@@ -212,6 +218,7 @@ def test_the_certificate_is_of_the_forces(comm: Any) -> None:
         assert report.certificate.equilibrium == pytest.approx(left / max(forces), rel=1e-6)
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_a_restart_is_the_straight_run(tmp_path: Any) -> None:
     from mpi4py import MPI
@@ -227,6 +234,7 @@ def test_a_restart_is_the_straight_run(tmp_path: Any) -> None:
     assert np.array_equal(whole.state.v, again.state.v)
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_steps_are_halved_where_a_corner_lands(comm: Any) -> None:
     """Halves lose less: a closure loses its force times the gap that is left to close."""
@@ -238,6 +246,7 @@ def test_steps_are_halved_where_a_corner_lands(comm: Any) -> None:
     assert 0.0 < lost[1] < 0.5 * lost[0]
 
 
+@pytest.mark.long
 @pytest.mark.two_ranks
 @pytest.mark.parametrize(
     ("wall", "friction"),
@@ -287,6 +296,7 @@ def test_a_block_is_thrown_into_a_corner(comm: Any, wall: Any, friction: Any) ->
     assert np.allclose(change[:2], impulse, rtol=1e-9)
 
 
+@pytest.mark.long
 def test_an_edge_rubs_on_floor_and_wall(comm: Any) -> None:
     """A box slides along the edge of a floor and a wall that carry it: each takes mu times its own
     impulse, with the nodes of the edge, which face both, in either."""
@@ -333,6 +343,7 @@ def test_schemes_that_blow_up_are_refused() -> None:
         next(vc.march(other, scheme=vc.EnergyMomentum(), dt=0.01, steps=1))
 
 
+@pytest.mark.long
 @pytest.mark.two_ranks
 def test_friction_brakes_a_block_that_slides(comm: Any) -> None:
     """While all of it slides, the floor takes mu times the impulse that carries the weight."""

@@ -24,6 +24,7 @@ STRING = vc.SaintVenantKirchhoff(E=1e6, nu=0.0, rho=1000.0)
 OMEGA = 8.0  # rad/s, of the spinning bar
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("law", [vc.SaintVenantKirchhoff, vc.NeoHookean])
 def test_steps_are_of_order_two(comm: Any, law: Any) -> None:
     """Differences of runs with dt, dt/2 and dt/4 fall by four, while a block spins and swings."""
@@ -56,6 +57,7 @@ def stretch_bar() -> Any:
     return lambda X: np.sign(X) * answer.sol(np.abs(X))[0]
 
 
+@pytest.mark.long
 @pytest.mark.two_ranks
 def test_a_spinning_bar_is_stretched_by_its_spin(comm: Any) -> None:
     """Its tip moves out as far as that of the exact bar, 21.07 mm, and the error falls by four with
@@ -103,6 +105,7 @@ def test_a_block_is_pressed_by_four_fifths(comm: Any) -> None:
         assert force == pytest.approx(law.shear_modulus * (1.0 / stretch - stretch), rel=1e-9)
 
 
+@pytest.mark.serial  # ranks: test_ranks_agree
 @pytest.mark.slow
 def test_a_barrel_is_pressed_by_four_fifths(comm: Any) -> None:
     """A block between rough planes in a medium that brakes it: it bulges, stays symmetric, and the
@@ -130,6 +133,7 @@ def test_a_barrel_is_pressed_by_four_fifths(comm: Any) -> None:
     assert 1.0 + 2.0 * right[0] > 1.6358
 
 
+@pytest.mark.serial  # ranks: test_ranks_agree
 @pytest.mark.slow
 @pytest.mark.parametrize(("width", "off"), [(0.25, 0.01), (0.5, 0.06)])
 def test_a_landing_loses_the_rate_of_housner(comm: Any, width: float, off: float) -> None:
@@ -153,6 +157,7 @@ def test_a_landing_loses_the_rate_of_housner(comm: Any, width: float, off: float
     assert sqrt(after / before) == pytest.approx(1.0 - 1.5 * sin(alpha) ** 2, rel=off)
 
 
+@pytest.mark.serial  # ranks: test_ranks_agree
 @pytest.mark.slow
 @pytest.mark.parametrize(("strength", "falls"), [(1.95, False), (2.15, True)])
 def test_a_pulse_overturns_a_column_as_the_rigid_one(
@@ -166,6 +171,7 @@ def test_a_pulse_overturns_a_column_as_the_rigid_one(
         assert tilt == pytest.approx(rigid, rel=0.2)
 
 
+@pytest.mark.long
 def test_ranks_agree(comm: Any) -> None:
     """A block lands on a rough corner: the places of all nodes are those of one rank."""
     from mpi4py import MPI

@@ -192,6 +192,7 @@ def test_one_rank_is_late(comm: Any, shared_tmp: Path, clock: Clock) -> None:
         assert np.abs(parts.history[name] - straight.history[name]).max() <= 1e-12 * size, name
 
 
+@pytest.mark.long
 @serial
 def test_the_command(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

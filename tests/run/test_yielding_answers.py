@@ -67,6 +67,7 @@ def strike(comm: Any, n: int) -> tuple[np.ndarray, float, float, float]:
     return stresses, closed, momentum / system.algebra.dot(system.M @ r, r), dt
 
 
+@pytest.mark.long
 def test_a_plastic_wave_in_a_slab(comm: Any) -> None:
     """Stress behind the front, contact time to a step, and a rebound that converges: the fronts are
     some cells wide, which takes a part of the impulse."""
@@ -146,6 +147,7 @@ def punch(comm: Any, law: Any, n: int, depths: Any, degree: int = 1) -> list[flo
     return [float(state.r_n.sum()) for state in vc.quasi_static(problem, depths)]
 
 
+@pytest.mark.long
 def test_prandtls_punch(comm: Any) -> None:
     """Clay of the strength c carries (2 + pi) c: from above, and falling with the mesh; the half
     element beside the strip counts. The load no longer grows."""

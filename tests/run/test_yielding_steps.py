@@ -38,6 +38,7 @@ def run(problem: Any, law: str, steps: int = 40, **more: Any) -> Any:
     return vc.simulate(problem, steps=steps, **given)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("law", LAWS)
 def test_a_block_is_thrown(comm: Any, law: str) -> None:
     """Every step is certified, the law of the material too; the ledger closes by formulas of their
@@ -56,6 +57,7 @@ def test_a_block_is_thrown(comm: Any, law: str) -> None:
         assert history["iterations"].mean() <= 25.0
 
 
+@pytest.mark.long
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("solver", [Volume(), Iterative()], ids=repr)
 def test_solvers_agree(comm: Any, solver: Any) -> None:
@@ -112,6 +114,7 @@ def test_schemes_that_take_other_stresses_are_refused(comm: Any, scheme: Any) ->
         run(throw(comm), "J2", scheme=scheme)
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_the_loss_of_the_mean_of_both_ends_is_of_second_order(comm: Any) -> None:
     """Smooth yielding of a body that rings: the algorithmic loss of a fixed time falls by four
@@ -138,6 +141,7 @@ def test_the_loss_of_the_mean_of_both_ends_is_of_second_order(comm: Any) -> None
     assert losses[0] / losses[2] >= 6.0
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_what_is_thrown_away_leaves_no_trace(comm: Any) -> None:
     """Attempts of other lengths between accepted steps change nothing, to the last bit; nor do
@@ -159,6 +163,7 @@ def test_what_is_thrown_away_leaves_no_trace(comm: Any) -> None:
         assert np.array_equal(plain.state.memory[name], busy.state.memory[name])
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_halved_steps_are_those_of_a_plan_of_halves(comm: Any) -> None:
     """A base step that is halved at an impact is thrown away; its halves go on from where it
@@ -183,6 +188,7 @@ def test_halved_steps_are_those_of_a_plan_of_halves(comm: Any) -> None:
         assert np.abs(stepper.state.u - state.u).max() <= 1e-12 * np.abs(state.u).max()
 
 
+@pytest.mark.long
 @pytest.mark.serial
 @pytest.mark.parametrize("law", ["J2", "Iwan"])
 def test_a_restart_is_the_straight_run(comm: Any, tmp_path: Path, law: str) -> None:
@@ -197,6 +203,7 @@ def test_a_restart_is_the_straight_run(comm: Any, tmp_path: Path, law: str) -> N
     assert np.array_equal(again.history["loss_plastic"], straight.history["loss_plastic"])
 
 
+@pytest.mark.long
 def test_restart_on_another_number_of_ranks(comm: Any, shared_tmp: Path) -> None:
     """A checkpoint of one rank goes on on all of them, and one of all of them on one."""
     from mpi4py import MPI
@@ -218,6 +225,7 @@ def test_restart_on_another_number_of_ranks(comm: Any, shared_tmp: Path) -> None
             ), name
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_a_checkpoint_of_other_materials_is_refused(comm: Any, tmp_path: Path) -> None:
     run(throw(comm, "J2"), "J2", steps=5, out=tmp_path)
@@ -228,6 +236,7 @@ def test_a_checkpoint_of_other_materials_is_refused(comm: Any, tmp_path: Path) -
     run(throw(comm, "J2"), "J2", out=tmp_path, restart=True, changed=True, dt=0.5 * step_of("J2"))
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_another_length_of_steps_keeps_what_materials_remember(comm: Any, tmp_path: Path) -> None:
     """A changed dt makes schemes begin anew; the body stays deformed, as a stepper shows."""
@@ -343,6 +352,7 @@ def test_damping_is_of_the_elastic_stiffness(comm: Any) -> None:
     assert np.allclose(system.C @ u, 2e-3 * (system.K @ u), rtol=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_a_shaken_layer_of_iwan_soil_loses_what_masing_says(comm: Any) -> None:
     """A layer in simple shear, to and fro by its top in load steps: the work of a loop is that of
@@ -394,6 +404,7 @@ def test_histories_of_linear_bodies_have_no_plastic_loss(comm: Any) -> None:
     assert "loss_plastic" not in found.history
 
 
+@pytest.mark.long
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("mortar", [False, True], ids=["nodes", "mortar"])
 def test_a_block_falls_on_ground_that_yields(comm: Any, mortar: bool) -> None:
@@ -506,6 +517,7 @@ def test_mirrored_throws_are_mirrored(comm: Any, law: str) -> None:
     assert np.abs(ends[0] - ends[1]).max() <= 1e-7 * np.abs(ends[0]).max()
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_units_of_force_do_not_matter(comm: Any) -> None:
     """With all masses and stresses in thousands the motion is the same."""
@@ -521,6 +533,7 @@ def test_units_of_force_do_not_matter(comm: Any) -> None:
     assert np.abs(ends[0] - ends[1]).max() <= 1e-7 * np.abs(ends[0]).max()
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_hexahedra_and_tetrahedra_are_thrown(comm: Any) -> None:
     """The same laws in space, with bbar and with degree 2."""

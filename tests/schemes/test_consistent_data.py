@@ -293,6 +293,7 @@ def test_memory_of_another_time_or_scheme_is_not_used(scheme: Any) -> None:
         )
 
 
+@pytest.mark.long
 @schemes
 def test_V15_oblique_impact_with_friction(scheme: Any) -> None:
     """V1.5 on redistributed mass: slip speed, impulses and friction work of the exact solution, and

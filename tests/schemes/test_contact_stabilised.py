@@ -177,6 +177,7 @@ def test_V97_ledger_with_damping_and_base_motion(name):
         assert min(found.contact, found.algorithmic) >= -1e-12 * E0
 
 
+@pytest.mark.long
 def test_damping_never_gains_energy_in_impacts():
     """V9.5: heavy damping with C (u1 - u0)/dt keeps the energy non-increasing where the projection
     moves points."""

@@ -67,6 +67,7 @@ def test_volume_and_condensed_routes_take_the_same_steps(scheme: Any) -> None:
     assert checked.worst <= 1e-9
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "dt", [WALL_DT, HalvedAtImpact(WALL_DT, halvings=2)], ids=["whole", "halved"]
 )

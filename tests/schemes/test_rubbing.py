@@ -21,6 +21,7 @@ pytestmark = pytest.mark.serial
 STABILISED, INELASTIC, ELASTIC = ContactStabilisedNewmark(), MoreauJean(), MoreauJean(e=1.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scheme", [STABILISED, INELASTIC, ELASTIC])
 def test_V15_oblique_impact(scheme: Any) -> None:
     """V1.5: slip speed 0.575736 during the contact, impulses (2.0, 0.6) on the base, energy 1 -

@@ -42,6 +42,7 @@ def test_V41_spectrum_is_that_of_newmark(weights):
             assert np.abs(roots).max() <= 1.0 + 1e-10
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("impact", [None, Inelastic()])
 def test_V41_half_half_is_the_midpoint_rule_with_contact(impact):
     """V4.1: SS22(½, ½) and Zienkiewicz-Wood-Taylor(½), every step to 1e-10, with damping, base

@@ -120,6 +120,7 @@ def test_a_number_that_the_run_does_not_have_is_told_before(
         read_case(case, ["sheet.units.stress=m"]).check()
 
 
+@pytest.mark.long
 def test_the_mechanics_do_not_read_the_sheet() -> None:
     """The shipped wall with a sheet makes the same problem and columns."""
     from mpi4py import MPI

@@ -72,6 +72,7 @@ def test_pystrata_itself_finds_the_same(peak):
     assert max(differences(found, *shake91.by_pystrata(record))) < 5e-6
 
 
+@pytest.mark.long
 @pytest.mark.promise("guide/soil.md", "waves with the same damping to 0.3 %", bound="0.8 %")
 def test_its_column_moves_alike_in_time():
     """Damping of the stiffness, within motion: elements of a quarter of a metre against waves, to

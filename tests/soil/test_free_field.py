@@ -56,6 +56,7 @@ def layered(comm, kind, *, simplices=False, n=1):
     return linear(free, **shaken), linear(tied, **shaken)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("kind", "name"),
     [

@@ -183,6 +183,7 @@ def test_other_schemes_too(damped_frames, name):
     assert difference(damped_frames, SCHEMES[name]) <= 1e-10
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_with_friction_on_an_obstacle_that_goes_along(comm):
     """Slip is measured against the moving wall."""
@@ -226,6 +227,7 @@ def test_a_block_on_a_box_of_soil_whose_base_moves(comm):
     assert difference((pair[0], pair[1]), vc.Trapezoidal(), 60, rest=True, changes=2) <= 1e-10
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_a_base_that_starts_with_an_acceleration_has_the_same_static_stage(comm):
     """At rest nothing feels the inertia of the first sample: measured 4e-13."""
@@ -233,6 +235,7 @@ def test_a_base_that_starts_with_an_acceleration_has_the_same_static_stage(comm)
     assert difference(pair, vc.Trapezoidal(), rest=True) <= 1e-10
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_mass_damping_tells_the_frames_apart(comm):
     """alpha M acts on absolute or on relative velocity: not the same problem."""

@@ -147,6 +147,7 @@ def test_free_field_sides_follow(comm):
     assert np.allclose(free.changes, tied.changes, rtol=1e-7)
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_a_box_is_the_strip(comm):
     """In space, between tied sides: the same changes after every run, the same stiffness."""

@@ -305,6 +305,7 @@ def test_fixed_point_contracts_faster_for_less_friction() -> None:
     assert 0.0 < factors[0] < factors[1] < factors[2] < 1.0
 
 
+@pytest.mark.long
 def test_extrapolation_shortens_fixed_points() -> None:
     """2D and 3D, mu = 0.5: Anderson's method needs fewer problems than plain iterations;
     also where the plain map expands before it contracts (mu = 0.8, one strongly coupled node)."""

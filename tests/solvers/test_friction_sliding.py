@@ -145,6 +145,7 @@ def test_friction_force_does_not_depend_on_the_number_of_points() -> None:
 LAWS = [Coulomb(0.2), SlipRateCoulomb(ExponentialDecay(0.3, 0.15, 0.05))]
 
 
+@pytest.mark.long
 @pytest.mark.serial
 @pytest.mark.parametrize(
     ("friction", "cycles", "period"),
@@ -220,6 +221,7 @@ def test_all_methods_agree_on_a_finite_element_step(comm: Any, d: int) -> None:
         assert np.abs(everywhere(other.r_t) - r_t).max() <= 1e-9 * r_n.max()
 
 
+@pytest.mark.long
 def test_ranks_agree_on_friction_of_the_slip_rate(comm: Any) -> None:
     """All ranks together and each alone: the same motion, 1e-10."""
     from mpi4py import MPI

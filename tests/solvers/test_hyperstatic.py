@@ -86,6 +86,7 @@ class Node:
         return self.free - self.C @ self.B.T @ r.ravel()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("kind", "mu", "count"),
     [

@@ -55,6 +55,7 @@ def test_factors_are_made_again_and_the_answer_is_the_condensed_one(problem, cap
         assert np.array_equal(one.active, other.active)
 
 
+@pytest.mark.long
 @pytest.mark.two_ranks
 def test_factors_that_fail_again_are_told(problem, monkeypatch):
     monkeypatch.setattr("vi_contact.solvers.iterative.route.RAISED", 1e-3)

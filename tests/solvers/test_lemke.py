@@ -35,6 +35,7 @@ def random_p_matrices(count: int, m: int) -> list[Array]:
     return found
 
 
+@pytest.mark.long
 def test_p_matrices_have_the_solution_that_enumeration_finds():
     """30 P-matrices of 5 rows that are far from symmetric, 5 loads each: one solution, and this
     one."""

@@ -33,6 +33,25 @@ give_back(keep_communicator(MPI.COMM_WORLD))
 """
 
 
+KEPT = """
+import numpy as np
+import vi_contact as vc
+
+chain = vc.system_from_arrays(
+    np.ones(3),
+    None,
+    1e6 * np.array([[1.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]]),
+    coordinates=[[0.0], [1.0], [2.0]],
+    v0=np.full(3, -1.0),
+)
+wall = vc.contact_points(chain, [0], [-1.0], gap0=1e-3)
+problem = vc.ContactProblem(chain, wall, impact=vc.Inelastic())
+steppers = [vc.Stepper(problem, solver=solver) for solver in (vc.Iterative(), vc.Volume())]
+for stepper in steppers:
+    stepper.accept(stepper.attempt(1e-4))
+"""
+
+
 @pytest.mark.long
 def test_every_matrix_solver_and_vector_is_freed(tmp_path: Path) -> None:
     """As many destructions as creations in PETSc's own account."""
@@ -53,3 +72,13 @@ def test_every_matrix_solver_and_vector_is_freed(tmp_path: Path) -> None:
     for name in ("Matrix", "Vector", "Krylov Solver", "Preconditioner", "Index Set"):
         made, freed = kinds[name]
         assert made == freed, f"{made - freed} of {made}: {name}"
+
+
+def test_programs_end_while_they_hold_a_solver() -> None:
+    """Solvers of matrices without a mesh, which a program keeps to its end, do not crash there."""
+    paths = os.pathsep.join([str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")])
+    environment = {**os.environ, "PYTHONPATH": paths}
+    done = subprocess.run(
+        [sys.executable, "-c", KEPT], env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr

@@ -48,6 +48,7 @@ def complementary(G: Array, q: Array, bilateral: Array) -> Array:
     raise AssertionError("no active set solves the problem")
 
 
+@pytest.mark.long
 @Fuzz("lcp", __file__).property(
     entries=st.lists(ENTRY, min_size=1, max_size=25),
     gaps=st.lists(ENTRY, min_size=1, max_size=5),

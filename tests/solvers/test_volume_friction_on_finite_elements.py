@@ -47,6 +47,7 @@ def compared(
     return checked, states
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("angle", [0.0, pytest.param(0.3, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("simplices", [False, True], ids=["quadrilaterals", "triangles"])
 @pytest.mark.parametrize("friction", ROUGH_ON_ONE_SIDE, ids=["coulomb", "tresca"])

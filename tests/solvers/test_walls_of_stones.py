@@ -62,6 +62,7 @@ def march(problem: vc.ContactProblem, steps: int, rows: int, patch: Any) -> tupl
     return stepper.state, solver.friction
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("depth", [None, 0.2], ids=["plane", "space"])
 def test_a_sparse_g_gives_what_a_dense_one_gives(depth: Any, monkeypatch: Any) -> None:
     """Two ways to one answer, forces of rings too: their least split is unique."""
@@ -88,6 +89,7 @@ def test_equal_stones_share_a_factor(monkeypatch: Any) -> None:
     assert sorted(len(shape.unknowns) for shape in shapes) == [1, 2, 3]
 
 
+@pytest.mark.long
 def test_restarts_and_runs_agree(monkeypatch: Any) -> None:
     """What is kept from step to step saves time, and changes answers by rounding alone."""
     problem = make_wall(MPI.COMM_WORLD)

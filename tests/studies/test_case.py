@@ -629,6 +629,7 @@ def test_what_follows_from_the_first_mode() -> None:
         )
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_the_command_runs_checks_and_restarts(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]

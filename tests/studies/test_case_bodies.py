@@ -161,6 +161,7 @@ def test_a_body_with_a_mesh_may_have_a_layer(tmp_path):
     assert history["contact_min_gap"].min() > 0.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["beam", "layer"])
 def test_a_run_goes_on_after_a_stop(name, tmp_path):
     """A run that has stopped half way, within the layer too, ends as one that has not."""
@@ -290,6 +291,7 @@ def test_what_does_not_go_with_a_layer_is_refused(old, new, says, tmp_path):
         read_case(case).check()
 
 
+@pytest.mark.long
 def test_friction_of_a_body_that_cannot_slide_is_refused(tmp_path):
     """In the file itself; after ``--set`` it has nothing to act on, and is let be."""
     text = Path(locate("beam")).read_text(encoding="utf-8")

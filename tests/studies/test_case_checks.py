@@ -118,6 +118,7 @@ def test_wrong_tables_are_refused_before_the_run(
         read_case(tmp_path / "layer.toml").check()
 
 
+@pytest.mark.long
 def test_the_page_prints_what_it_says(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """S4.7: the case of docs/guide/checks.md, run from its text."""
     page = (Path(vi_contact.__file__).parents[1] / "docs" / "guide" / "checks.md").read_text(

@@ -82,6 +82,7 @@ def said(capsys: pytest.CaptureFixture[str], arguments: list[str]) -> str:
     return captured.err
 
 
+@pytest.mark.long
 def test_every_path_is_relative_to_the_case_file(
     folder: Path,
     tmp_path: Path,

@@ -109,6 +109,7 @@ def test_a_column_that_nothing_holds_is_told_by_its_bodies(tmp_path: Path) -> No
         read_case(path).run(COMM, progress=False)
 
 
+@pytest.mark.long
 def test_a_wall_has_joints_and_a_foot(tmp_path: Path) -> None:
     """Stones in running bond, T joints and all: both tables have their points, and
     friction of its own."""

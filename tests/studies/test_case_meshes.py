@@ -60,6 +60,7 @@ def test_all_paths_are_those_of_the_case_file(
         assert found(read_case(path)) == folder / "a" / "b.msh", table
 
 
+@pytest.mark.long
 def test_the_dam_of_the_guide_stands_on_its_joint(tmp_path: Path) -> None:
     """C1.1, the case and script of docs/guide/studies.md: V = gamma H²/2, N = weight less uplift,
     to 1e-9."""

@@ -451,6 +451,7 @@ def test_mistakes_are_one_sentence(tmp_path: Path, name: str) -> None:
     assert f"{told.value}".startswith(f"{tmp_path / 'house.toml'}{said}"), f"{told.value}"
 
 
+@pytest.mark.long
 def test_another_friction_comes_with_a_static_stage(shared_tmp: Path) -> None:
     """As the refusal of another one in a motion says: under the new law the house slips to rest,
     and stays there."""
@@ -470,6 +471,7 @@ def test_another_friction_comes_with_a_static_stage(shared_tmp: Path) -> None:
     assert found["energy_kinetic"].max() < 1e-15 * found["energy_strain"][0]
 
 
+@pytest.mark.long
 def test_what_stages_cannot_do(shared_tmp: Path) -> None:
     """Other supports after a motion; loads that begin with a motion."""
     moved = HOUSE.replace('name = "aftershock"', 'name = "aftershock"\nrelease = true').replace(

@@ -149,6 +149,7 @@ def test_shear_in_the_plane_is_that_of_the_axes_there(
     )
 
 
+@pytest.mark.long
 def test_any_number_of_ranks_describes_alike(shared_tmp: Path) -> None:
     path = written(shared_tmp)
     whole, alone = described(path), described(path, MPI.COMM_SELF)
@@ -179,6 +180,7 @@ def test_the_command_tells_and_draws(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert (out / "model.png").read_bytes()[:4] == b"\x89PNG"
 
 
+@pytest.mark.long
 @pytest.mark.serial
 @pytest.mark.filterwarnings("ignore:Glyph 27")
 def test_the_model_of_a_run_is_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -213,6 +215,7 @@ def test_the_model_of_a_run_is_kept(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert (out / "check" / "model.png").read_bytes()[:4] == b"\x89PNG"
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_the_page_shows_what_the_command_tells(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -241,6 +241,7 @@ def test_the_first_period_of_the_model(motions: list[str]) -> None:
         read_intensity("sa:T2", lambda: 1.0)
 
 
+@pytest.mark.long
 def test_a_study_ends_in_curves_and_goes_on(
     tmp_path: Path, motions: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -161,6 +161,7 @@ def test_finished_runs_are_kept(study: Path) -> None:
     assert (study / "ida.csv").read_bytes() == before
 
 
+@pytest.mark.long
 def test_a_failed_run_is_a_row_and_a_status(study: Path, tmp_path: Path, capsys: Any) -> None:
     """The command ends with 1 and says so, with the reason of the first failed run; the others keep
     their rows."""
@@ -248,6 +249,7 @@ def test_an_interrupted_run_goes_on_and_failures_are_rows(study: Path, tmp_path:
     )
 
 
+@pytest.mark.long
 def test_parts_levels_and_runs_that_die(study: Path) -> None:
     """--part takes every n-th run; levels scale every record to the intensity; a process that dies
     is a row."""
@@ -299,6 +301,7 @@ def test_stopping_stops_the_runs(study: Path, monkeypatch: pytest.MonkeyPatch) -
         os.kill(int(going.read_text()), 0)
 
 
+@pytest.mark.long
 @pytest.mark.promise("guide/studies.md", "The demands agree to 1e-13", bound="1e-10")
 def test_runs_of_a_body_keep_their_own_books(study: Path, tmp_path: Path) -> None:
     """Runs that share a process share the body, and none of their recorders: the ledger of each is
@@ -487,6 +490,7 @@ def test_two_motions_and_their_settings(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.long
 def test_measures() -> None:
     """Degrees: f times the motion has f**degree of the measure. Demands skip what is no number."""
     record = Record(np.sin(0.3 * np.arange(400)), 0.01)

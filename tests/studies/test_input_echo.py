@@ -145,6 +145,7 @@ def test_loads_are_told_per_metre_whatever_the_slice(shared_tmp: Path) -> None:
     assert mega["upper: Young's modulus E"][:2] == ("25000", "MPa")
 
 
+@pytest.mark.long
 def test_materials_sides_and_damping_by_hand(shared_tmp: Path) -> None:
     model = described(shared_tmp)
     rows = rows_of(model)
@@ -190,6 +191,7 @@ def test_loads_that_change_say_so(shared_tmp: Path) -> None:
     assert growing["varies"] == "at t = 0 s; it changes with time"
 
 
+@pytest.mark.long
 def test_any_number_of_ranks_tells_the_same(shared_tmp: Path) -> None:
     many = rows_of(described(shared_tmp))
     alone = rows_of(described(shared_tmp, comm=MPI.COMM_SELF))
@@ -269,6 +271,7 @@ def test_the_report_has_the_rows_of_the_check(
     assert model == checked
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
@@ -293,6 +296,7 @@ def test_odd_numbers_are_doubted(shared_tmp: Path, settings: list[str], said: st
     assert not any(said in warning for warning in described(shared_tmp)["warnings"])
 
 
+@pytest.mark.long
 def test_damping_by_mass_and_drift_on_a_compliant_base(shared_tmp: Path) -> None:
     """A record of one sign drifts away; alpha brakes what waves move in space."""
     base = (
@@ -356,6 +360,7 @@ def test_wrong_design_spectra_are_refused(table: Any, said: str) -> None:
     assert "[sheet" in str(refused.value)
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_a_case_names_its_design_spectrum(shared_tmp: Path) -> None:
     """Both kinds, in the file; an example of docs/guide/check.md. It was refused as unknown key."""

@@ -55,6 +55,7 @@ def written(folder: Path, text: str = BLOCK) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_a_joint_of_a_table_is_that_of_python(shared_tmp: Path) -> None:
     case = read_case(written(shared_tmp))
     problem = case.problem(COMM)
@@ -68,6 +69,8 @@ def test_a_joint_of_a_table_is_that_of_python(shared_tmp: Path) -> None:
     assert run.history["energy_joint"].max() > 0.0
 
 
+@pytest.mark.long
+@pytest.mark.serial  # ranks: the joint of a table
 def test_tables_may_have_other_joints(shared_tmp: Path) -> None:
     """The base is bound, and the top, which is open, rubs only."""
     second = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from vi_contact import InputError
+from vi_contact import InputError, StepFailure
+from vi_contact.practice.plots.deformed import read_frames
 from vi_contact.practice.studies import read_case
 
 GEO = """
@@ -119,6 +121,7 @@ def write(folder: Path, text: str = CASE) -> Path:
     return path
 
 
+@pytest.mark.long
 @pytest.mark.serial
 def test_a_restart_of_lifts_is_the_straight_run(tmp_path: Path) -> None:
     """Six stages, a quake between: stopped in the first motion, and gone on, the last state is the
@@ -163,3 +166,78 @@ def test_wrong_lifts_are_refused_in_a_sentence(
         case.problem(MPI.COMM_SELF)
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("kind", ["XDMF", "VTKHDF"])
+def test_frames_have_the_bodies_that_are_there(tmp_path: Path, kind: str) -> None:
+    """Ground alone, with fill, with the block, and without it again: the area of the cells of each
+    stage, every node is of a cell, and the picture of the model has the same bodies."""
+    text = CASE.replace("steps = 12", "steps = 2").replace(
+        "[[excitation]]", f'[fields]\ntype = "{kind}"\nevery = 2\n[[excitation]]'
+    )
+    out = tmp_path / "out"
+    read_case(write(tmp_path, text)).run(MPI.COMM_SELF, progress=False, out=out)
+    areas = {"stages/1_ground": 2.0, "stages/2_fill": 4.0, "stages/4_shock": 6.0, ".": 4.0}
+    for folder, area in areas.items():
+        frames = read_frames(out / folder)
+        corners = frames.points[frames.cells]
+        sides = corners[:, 1:] - corners[:, :1]
+        assert np.abs(np.linalg.det(sides)).sum() / 2.0 == pytest.approx(area, rel=1e-12)
+        assert frames.points[:, 1].max() == pytest.approx(area / 2.0)
+        _, u, stress = frames.at(0.0)
+        assert u.shape == frames.points.shape
+        assert np.all(stress > 0.0)
+        model = json.loads((out / folder / "model.json").read_text())
+        drawn = [np.array(part["lines"]) for part in model["outline"] if part["lines"]]
+        lines = np.concatenate(drawn)
+        assert lines[:, [1, 3]].max() == pytest.approx(area / 2.0)
+    # what is placed touches what has settled, and a linear body is called so
+    model = json.loads((out / "stages" / "3_block" / "model.json").read_text())
+    assert np.abs(model["contact"][0]["gaps"]).max() <= 1e-12
+    assert [body["material"]["type"] for body in model["bodies"]][-1] == "LinearElastic"
+
+
+@pytest.mark.serial
+def test_what_is_absent_is_named(tmp_path: Path) -> None:
+    """A record of a part whose bodies are absent, and a body that loses what it stands on: one
+    sentence each, which names the stage or the part."""
+    record = '[[record]]\ntype = "Resultants"\nname = "foot"\npart = "foot"\n'
+    early = write(tmp_path, CASE.replace("[[stage]]", record + "[[stage]]", 1))
+    with pytest.raises(InputError, match="part 'foot': nothing is in contact there while bodies"):
+        read_case(early).run(MPI.COMM_SELF, progress=False)
+    short = CASE[: CASE.index('[[stage]]\nname = "shock"')]
+    gone = write(tmp_path, short + '[[stage]]\nname = "dug"\ntype = "static"\nremove = "fill"\n')
+    with pytest.raises(StepFailure, match=r"'dug': .* nothing holds the body of .* nodes"):
+        read_case(gone).run(MPI.COMM_SELF, progress=False)
+
+
+@pytest.mark.serial
+def test_a_body_that_is_taken_away_and_placed_again(tmp_path: Path) -> None:
+    """The block goes and comes back, and fill and block come at once: it stands with its weight,
+    and the supports carry what is there."""
+    head = CASE[: CASE.index("[[stage]]")].replace("steps = 12", "steps = 2")
+    reactions = (
+        '[[record]]\ntype = "Contact"\n[[record]]\ntype = "Reactions"\nname = "rock"\n'
+        'facets = "bottom"\ncentre = [1.0, 0.0]\ngravity = [0.0, -9.80665]\n'
+    )
+
+    def list_stages(*rows: tuple[str, str]) -> str:
+        tables = []
+        for number, (verb, bodies) in enumerate(rows):
+            table = f'[[stage]]\nname = "s{number}"\ntype = "static"\n'
+            tables.append(table + (f"{verb} = {bodies}\n" if verb else ""))
+        return "".join(tables)
+
+    ways = {
+        "again": (("", ""), ("add", '"fill"'), ("add", '"block"'), ("remove", '"block"')),
+        "at once": (("", ""), ("add", '["fill", "block"]')),
+    }
+    for name, rows in ways.items():
+        if name == "again":
+            rows = (*rows, ("add", '"block"'))
+        path = write(tmp_path, head + reactions + list_stages(*rows))
+        history = read_case(path).run(MPI.COMM_SELF, progress=False).history
+        assert history["contact_force_y"][-1] == pytest.approx(WEIGHT, rel=1e-7)
+        soil = 2000 * 9.80665 * 4.0
+        assert history["reaction_y_rock"][-1] == pytest.approx(soil + WEIGHT, rel=1e-8)

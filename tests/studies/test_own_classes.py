@@ -334,6 +334,7 @@ def test_arguments_and_objects_are_checked(folder: Path) -> None:
         assert "give the name of a Python package" in said(folder, allow=[wrong])
 
 
+@pytest.mark.long
 def test_random_names(folder: Path) -> None:
     """Whatever a file says is one sentence, and imports nothing but the allowed package."""
     pieces = [

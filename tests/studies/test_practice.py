@@ -140,27 +140,34 @@ def test_wall_shares_its_gravity_stage_and_its_matrices_over_records() -> None:
 @pytest.mark.long
 @pytest.mark.promise("guide/practice.md", "the run has them to nine digits")
 def test_dam_has_the_resultant_of_weight_water_and_uplift(tmp_path: Path) -> None:
-    """N = W - U, T = -H and their eccentricity, in closed form; the factor of safety mu N/|T| falls
-    below one for a while under the motion, and the dam is then further downstream."""
-    history = run("dam", tmp_path, "excitation.1.scale=3.0")
+    """N = W, T = -H and their eccentricity, uplift with drains and safety with cohesion, in closed
+    form; under a strong motion the joint cracks, slides, and has lost what fracture took."""
+    # the joint is solved to a tenth of the tolerance; large cells have a corner at 6 m, where the
+    # line of the pressure has its kink
+    finer = ("run.tolerance=1e-10", "contact.1.joint.water.drain=6.0")
+    history = run("dam", tmp_path, "excitation.1.scale=3.0", *finer)
     weight, arm = 700.0 * 2400.0 * G, (200.0 * 2.5 + 500.0 * (5.0 + 25.0 / 3.0)) / 700.0
     head = 1000.0 * G * 36.0
-    water, uplift = 0.5 * head * 36.0, 0.5 * head * 30.0
-    n = weight - uplift
-    e = (weight * arm - uplift * 10.0 + water * 12.0) / n - 15.0  # from the middle, towards the toe
-    assert history["N_joint"][0] == pytest.approx(n, rel=EXACT)
+    water = 0.5 * head * 36.0
+    left = 1.0 - 0.6667  # by the drains
+    uplift = 0.5 * head * ((1.0 + left) * 6.0 + left * 24.0)
+    e = arm + water * 12.0 / weight - 15.0  # from the middle, towards the toe
+    assert history["N_joint"][0] == pytest.approx(weight, rel=EXACT)
+    assert history["uplift_force"] == pytest.approx(np.full(201, uplift), rel=EXACT)  # kept
+    assert history["uplift_effective"][0] == pytest.approx(weight - uplift, rel=EXACT)
     assert history["T_joint"][0] == pytest.approx(-water, rel=EXACT)
-    assert history["e_joint"][0] == pytest.approx(e, rel=1e-8) and 0.0 < e < 5.0  # within the kern
-    # 1.32 against sliding
-    assert 1.0 / (1.0 - history["margin_joint"][0]) == pytest.approx(0.75 * n / water, rel=1e-8)
-    assert history["sliding_joint"][-1] - history["sliding_joint"][0] > 1e-4
-    assert history["margin_joint"].min() < 1e-9
+    assert history["e_joint"][0] == pytest.approx(e, rel=1e-8)
+    safety = (0.75 * (weight - uplift) + 3e5 * 30.0) / water  # 3.09 against sliding
+    # an end of the joint slips by less than a micrometre and loses a little of its cohesion
+    assert 0.999 * safety < 1.0 / (1.0 - history["margin_joint"][0]) < safety
+    assert history["sliding_joint"][0] < 1e-6
 
-    # Newmark's block has the yield coefficient of these forces.
-    (newmark,) = comparisons(tmp_path)
-    assert newmark.inputs["mu"][0] == pytest.approx((0.75 * n - water) / weight, rel=1e-8)
+    # nothing has cracked at rest; a square metre of crack takes 100 J
+    assert history["crack_length"][0] == 0.0 and history["crack_length"].max() > 3.0
+    assert 10.0 < history["loss_fracture"][-1] <= 100.0 * 30.0
+    assert history["sliding_joint"][-1] - history["sliding_joint"][0] > 1e-4
     model = json.loads((tmp_path / "model.json").read_text("utf-8"))
-    assert [(part["name"], part["mu"]) for part in model["contact"]] == [("joint", 0.75)]
+    assert [part["name"] for part in model["contact"]] == ["joint"]
     toes = json.loads((tmp_path / "columns.json").read_text("utf-8"))
     assert "at the toe" in toes["pressure_high_joint"]["meaning"]
 

@@ -91,6 +91,7 @@ def test_both_columns_and_their_difference(
     assert "was not measured" in describe_refinement(read_run(out), {}).sentences[-1]
 
 
+@pytest.mark.long
 def test_what_fails_is_told(tmp_path: Path) -> None:
     """A refined run that cannot be made is a sentence of the report, the other one a column."""
     case, out = written(tmp_path), tmp_path / "run"

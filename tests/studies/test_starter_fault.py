@@ -20,6 +20,7 @@ pytestmark = pytest.mark.serial
 SECOND = "run.t_end=1.0"  # the quick size that the case names
 
 
+@pytest.mark.long
 def test_the_fault_is_written_without_doubts(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -40,6 +41,7 @@ def test_the_fault_is_written_without_doubts(
     assert "elements of 500 m at the fault are longer than" in doubt and "= 312 m" in doubt
 
 
+@pytest.mark.long
 def test_the_rupture_of_the_starter(shared_tmp: Path) -> None:
     """It is forced at 2 km/s as far as 1.5 km, is the same on both sides, and does not reach its
     ends; what it gives up is work of the prestress, and the ledger is closed."""

@@ -54,6 +54,7 @@ def make_soil(share: float = 1.0) -> MohrCoulomb:
     return soil.weaken(share)
 
 
+@pytest.mark.long
 def test_a_slope_with_a_published_factor(comm: Any, tmp_path: Path) -> None:
     """Bishop and Morgenstern 1.38, Griffiths and Lane (1999, example 1) 1.4 by elements; found
     1.41 with cells of 2 m. Every equilibrium is certified, and slopes slip the more the nearer."""
@@ -71,6 +72,7 @@ def test_a_slope_with_a_published_factor(comm: Any, tmp_path: Path) -> None:
     assert strain.max() > 0.01
 
 
+@pytest.mark.long
 def test_a_weaker_soil_has_a_smaller_factor(comm: Any) -> None:
     """The factor of a soil with its strength over 2 is half: the search goes down from 1."""
     found = studies.strength_reduction(make_slope(comm, make_soil(2.0)), tolerance=0.1)
@@ -90,6 +92,7 @@ def test_what_has_no_factor_is_refused(comm: Any) -> None:
         studies.strength_reduction(elastic)
 
 
+@pytest.mark.long
 def test_the_command(
     comm: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -35,6 +35,7 @@ def run(scheme: Any, dt: Any = DT) -> vc.Solution:
     return BENCHMARK.run(scheme, dt, T_END)
 
 
+@pytest.mark.serial  # ranks: tests/schemes has it on them
 def test_the_scheme_of_the_warning_creates_none(caplog: pytest.LogCaptureFixture) -> None:
     """Where the default, HHT and halved steps warn, certified step by step, the scheme of the
     sentence creates none."""

@@ -128,8 +128,8 @@ def test_a_change_that_is_too_large_is_taken_in_parts(comm: Any) -> None:
     assert result.certificate.worst <= 1e-9 and np.max(np.abs(u.x.array - wanted)) <= 1e-7
 
 
+@pytest.mark.serial  # ranks: other cells and loads
 @pytest.mark.long
-@pytest.mark.two_ranks
 def test_a_form_goes_down_where_newtons_method_fails(comm: Any) -> None:
     """Half of the height at once: the work of F takes the place of the energy, which gives the same
     answer. Who limits the steps gets no more of them."""

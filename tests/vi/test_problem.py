@@ -291,6 +291,7 @@ def test_options_that_are_refused_are_refused_again(comm: Any) -> None:
 # --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.two_ranks
 @pytest.mark.parametrize(
     ("spot", "volatility", "price"), [(40.0, 0.2, 2.314), (40.0, 0.4, 5.312), (44.0, 0.4, 3.948)]

@@ -62,8 +62,8 @@ class JointWater:
         history: a factor f(t) of all pressures; None: 1.
     """
 
-    heel: tuple[float, ...]
-    toe: tuple[float, ...]
+    heel: Annotated[tuple[float, ...], Unit("m")]
+    toe: Annotated[tuple[float, ...], Unit("m")]
     level: Annotated[float, Finite, Unit("m"), "the level"]
     tail: Annotated[float | None, Finite, Unit("m"), "the tail water"] = None
     drain: Annotated[float | None, Positive, Unit("m"), "the drain"] = None

@@ -19,6 +19,7 @@ from .recorders import LargestStrain as LargestStrain
 from .recorders import Probe as Probe
 from .recorders import Racking as Racking
 from .recorders import Reactions as Reactions
+from .recorders import ReservoirWater as ReservoirWater
 from .recorders import Resultants as Resultants
 from .recorders import SectionForces as SectionForces
 from .recorders import StressStrain as StressStrain

@@ -142,7 +142,7 @@ def _assemble_closed(problem: ContactProblem, closed: Mask) -> tuple[Matrix, Mat
     The system is that of the nodal frames, without excitation. A closed condition on a rigid
     support takes its unknown out, and with friction the tangential ones too (sticking); one on a
     spring adds 1 / compliance to K_ii. Traces have no unknowns to take out: stiff springs hold
-    them.
+    them. The outlets of a reservoir are closed too.
 
     Args:
         problem: whose matrices they are.
@@ -155,13 +155,20 @@ def _assemble_closed(problem: ContactProblem, closed: Mask) -> tuple[Matrix, Mat
     soft = closed & ~surface.rigid
 
     free = np.ones(system.rows, dtype=bool)
+    outlets: Mask | None = getattr(system.space, "outlets", None)
     if surface.traces is not None:
         stiff = STIFF * largest(surface.comm, max_abs(system.K.diagonal()))
+        if outlets is not None:
+            rows = np.flatnonzero(outlets)
+            held = algebra.local(rows, rows, np.full(len(rows), stiff), system.rows)
+            system = system.changed(K=algebra.combine([(1.0, system.K), (1.0, held)]))
         normal = np.where(rigid, stiff, 0.0)
         normal[soft] = 1.0 / surface.compliance[soft]
         along = np.where(closed, stiff, 0.0)
         springs_of_traces = _make_trace_springs(problem, surface.traces, normal, along)
         return algebra.combine([(1.0, system.K), *springs_of_traces]), system.M, free
+    if outlets is not None:
+        free &= ~outlets
     free[surface.owned[rigid]] = False
     if problem.frictional:
         has_unknown = surface.tangents >= 0  # else the component is prescribed
@@ -258,6 +265,8 @@ def _describe_sources(system: SemiDiscreteSystem) -> Iterator[str]:
         yield quote(forms.damping)
     if forms.own_damping:
         yield "a damping form of its own"
+    if getattr(system.space, "outlets", None) is not None:
+        yield "water that leaves the reservoir, which the ratios of modes do not count"
     boundaries = []
     for boundary in forms.boundaries:
         boundaries.append(f"{type(boundary).__name__} on '{boundary.facets.name}'")

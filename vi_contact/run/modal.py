@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 import scipy.sparse as sp
 
-from ..core.algebra import Algebra, Array, Matrix, SerialFactor, SerialMatrix
+from ..core.algebra import Algebra, Array, Mask, Matrix, SerialFactor, SerialMatrix
 from ..core.arguments import check_arguments
 from ..core.errors import InputError
 from ..core.quantities import Positive, Remedy
@@ -29,6 +29,8 @@ def lowest_frequency(
 
     K is the reference stiffness of a body that is not linear.
 
+    Outlets of a reservoir are closed.
+
     By inverse iteration with one factorisation of K. The start vector is the static answer to a
     uniform acceleration in all directions: deterministic, and not orthogonal to the first mode of
     structures that a base motion can excite.
@@ -40,15 +42,20 @@ def lowest_frequency(
     if system.floating:
         raise InputError("the body is not held, so its lowest frequency is zero: fix a part of it")
     dot = system.algebra.dot
-    factor = system.algebra.factor(system.K)
+    # What meets dashpots alone is held.
+    K = system.K
+    still: Mask | None = getattr(system.space, "outlets", None)
+    if still is not None:
+        K = system.algebra.with_identity_rows(K, still)
+    factor = system.algebra.factor(K)
     directions = 1.0 + 0.1 * np.arange(system.influence.shape[1])
-    force = system.M @ (system.influence @ directions)
+    force = _hold(system.M @ (system.influence @ directions), still)
     square = 0.0  # (2 pi f)²
     for _ in range(max_iterations):
         # K phi_new = M phi; the Rayleigh quotient phiᵀ K phi / phiᵀ M phi needs no product with K,
         # because K phi_new is the force at hand.
         mode = factor.solve(force)
-        inertia = system.M @ mode
+        inertia = _hold(system.M @ mode, still)
         norm = dot(mode, inertia)
         last = square
         square = dot(mode, force) / norm
@@ -60,6 +67,11 @@ def lowest_frequency(
             "the lowest frequency did not settle: give a larger max_iterations, or the frequency"
         )
     return float(np.sqrt(square)) / (2.0 * np.pi)
+
+
+def _hold(force: Array, still: Mask | None) -> Array:
+    """Return a force (n,) without its entries at unknowns that are held."""
+    return force if still is None else np.where(still, 0.0, force)
 
 
 def natural_modes(

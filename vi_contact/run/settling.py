@@ -24,6 +24,7 @@ from ..core.verify import kkt_residual
 from ..solvers.certified import NEAR
 from ..solvers.nonlinear import NonlinearSolver
 from ..solvers.passes import Certified, Passes, certify
+from .loose_bodies import judge_loose_bodies
 from .rigid_bodies import RigidBodies, make_body_springs
 
 ITERATIONS = 60
@@ -85,6 +86,7 @@ class Settling:
             tolerance: of the certificate, relative.
             advice: end of the sentence that refuses a stage.
         """
+        self._problem = problem
         self._springs = make_body_springs(problem)
         self._bodies = RigidBodies(problem)
         self._tolerance = tolerance
@@ -103,9 +105,11 @@ class Settling:
         )
         if certify(passes, self._go(step), ITERATIONS) and passes.best is not None:
             return passes.best
+        loose = [sentence for sentence, _ in judge_loose_bodies(self._problem)]
         raise StepFailure(
             "the static stage of a body that is not linear and that contact alone holds was not "
-            f"solved (the residual stayed at {passes.least:.1e}): {self._advice}"
+            f"solved (the residual stayed at {passes.least:.1e}): "
+            f"{'; '.join(loose) or self._advice}"
         )
 
     def _go(self, step: StepProblem) -> Iterator[Certified]:

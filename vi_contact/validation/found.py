@@ -46,6 +46,9 @@ class Found:
     ) -> None:
         """Take the certificate and the unknowns of a static stage. Collective.
 
+        That of a linear body is computed from its answer alone; a body that is not linear has the
+        one of its stage.
+
         Args:
             problem: what stands in equilibrium.
             state: the equilibrium.
@@ -53,7 +56,11 @@ class Found:
         """
         rows = round(total(problem.surface.comm, problem.system.rows))
         self.unknowns = max(self.unknowns, rows)
-        self.certificate = _worse(self.certificate, certify_equilibrium(problem, state, before))
+        if problem.system.internal is None:
+            residual = certify_equilibrium(problem, state, before)
+        else:
+            residual = math.nan if state.certificate is None else state.certificate
+        self.certificate = _worse(self.certificate, residual)
 
 
 def certify_equilibrium(

@@ -48,18 +48,15 @@ def wall(axes: Any, h: History) -> None:
 
 
 def dam(axes: Any, h: History) -> None:
-    """Factor of safety against sliding, sliding, and where the resultant acts."""
-    safety, slid, place = axes
+    """Length of the crack, energy that its joint has lost, and safety against sliding."""
+    crack, lost, safety = axes
+    crack.plot(h["t"], h["crack_length"])
+    crack.set_title("length of the crack [m]")
+    lost.plot(h["t"], h["loss_fracture"])
+    lost.set_title("energy of fracture [J/m]")
     safety.plot(h["t"], 1.0 / (1.0 - h["margin_joint"]))
     safety.axhline(1.0, color="0.5", ls="--", lw=0.8)
-    safety.set(title="factor of safety mu N/|T|", ylim=(0.8, 4.0))
-    slid.plot(h["t"], 1e3 * (h["sliding_joint"] - h["sliding_joint"][0]))
-    slid.set_title("sliding downstream [mm]")
-    place.plot(h["t"], h["e_joint"])
-    for edge in (-5.0, 5.0):
-        place.axhline(edge, color="0.5", ls="--", lw=0.8)
-    place.text(h["t"][-1], 5.0, "kern", ha="right", va="bottom", fontsize=8)
-    place.set_title("resultant, from the middle [m]")
+    safety.set(title="factor of safety against sliding", ylim=(0.8, 6.0))
 
 
 def pier(axes: Any, h: History) -> None:

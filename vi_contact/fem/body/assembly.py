@@ -23,7 +23,7 @@ import numpy as np
 import ufl
 from dolfinx.mesh import Mesh
 
-from ...core.algebra import Array, from_each
+from ...core.algebra import Array, Mask, from_each
 from ...core.checks import instance
 from ...core.collective import Parts, agree
 from ...core.errors import InputError
@@ -60,7 +60,7 @@ from .initial_strains import InitialStrain, InitialStrains
 from .linear_forms import AnyLoad, LinearForm, Loads
 from .loads import BodyForce, Prescribed, Traction, evaluate
 from .own_forms import Forms, OwnForms
-from .reservoir import Reservoir, list_pressures
+from .reservoir import Reservoir, add_water, list_pressures
 from .space import FemSpace, translations
 from .ties import Tied
 from .turning_forms import TurningForms
@@ -213,31 +213,16 @@ def assemble(
         loads=(*as_tuple(loads), *list_pressures(reservoir)),
     )
 
-    # unknowns: nodes, which of their components are held or tied, and the elimination of these
-    V = compat.vector_space(mesh, degree) if space is None else space
-    nodes = number_nodes(V)
-    check_nodes(comm, nodes, degree)
-    if nodes.curved:
-        refuse_folded(mesh)
-    # what conditions hold of the owned blocks of the displacement's space
-    supports = [
-        held.support(compat.locate_owned_blocks(V, held.facets.indices), mesh.geometry.dim)
-        for held in conditions.held
-    ]
-    if bcs:
-        supports += [values.support(nodes.owned) for values in read_values(mesh, V, bcs)]
-    supports += [] if missing is None else hold_absent(comm, V, nodes, missing)
-    space = FemSpace(
-        V,
-        nodes,
-        supports,
-        conditions.tied,
+    space = _number_unknowns(
+        mesh,
+        space,
+        bcs,
+        conditions,
+        missing,
         degree=degree,
         quadrature_degree=quadrature_degree,
-        absent=missing,
     )
-    if bcs:
-        refuse_contradictions(space)
+    add_water(reservoir, space, section.thickness)
     rigid = np.column_stack([space.restrict(motion) for motion in space.translations])
 
     # the body: weak forms of its materials or of the user, absorbing boundaries, loads
@@ -271,7 +256,7 @@ def assemble(
         absorbers,
         algebra,
         base_inertia=base_inertia,
-        water=None if reservoir is None else reservoir.assemble_mass(space, section.thickness),
+        water=_weigh_water(space, reservoir, section.thickness),
     )
     M = reduced.M
     base_mass = None
@@ -283,16 +268,7 @@ def assemble(
         M=M,
         C=reduced.C,
         K=reduced.K,
-        load=replace(
-            load,
-            inertial=reduced.inertial,
-            viscous=(*reduced.viscous, *chain(*(boundary.viscous for boundary in acting))),
-            general=(
-                *load.general,
-                *reduced.elastic,
-                *chain(*(boundary.elastic for boundary in acting)),
-            ),
-        ),
+        load=_add_boundary_loads(load, reduced, acting),
         influence=rigid,
         base_mass=base_mass,
         u0=u0,
@@ -312,6 +288,78 @@ def assemble(
     del absorbers, reduced
     give_back(mesh.comm)
     return system
+
+
+def _number_unknowns(
+    mesh: Any,
+    space: Any,
+    bcs: tuple[Any, ...],
+    conditions: Conditions,
+    missing: Mask | None,
+    *,
+    degree: int,
+    quadrature_degree: int | None,
+) -> FemSpace:
+    """Make the numbered unknowns: held and tied components of nodes are eliminated.
+
+    Args:
+        mesh: DOLFINx mesh.
+        space: the user's own DOLFINx space, or None.
+        bcs: the user's own ``dirichletbc`` objects.
+        conditions: what holds, ties and loads the body.
+        missing: which local cells are absent, or None where all are there for good.
+        degree: of the displacement in each cell.
+        quadrature_degree: of all integrals, or None.
+
+    Raises:
+        InputError: nodes without a cell, folded cells, values that contradict one another.
+    """
+    V = compat.vector_space(mesh, degree) if space is None else space
+    comm = MpiComm(mesh.comm)
+    nodes = number_nodes(V)
+    check_nodes(comm, nodes, degree)
+    if nodes.curved:
+        refuse_folded(mesh)
+
+    # what conditions hold of the owned blocks of the displacement's space
+    supports = [
+        held.support(compat.locate_owned_blocks(V, held.facets.indices), mesh.geometry.dim)
+        for held in conditions.held
+    ]
+    if bcs:
+        supports += [values.support(nodes.owned) for values in read_values(mesh, V, bcs)]
+    supports += [] if missing is None else hold_absent(comm, V, nodes, missing)
+
+    numbered = FemSpace(
+        V,
+        nodes,
+        supports,
+        conditions.tied,
+        degree=degree,
+        quadrature_degree=quadrature_degree,
+        absent=missing,
+    )
+    if bcs:
+        refuse_contradictions(numbered)
+    return numbered
+
+
+def _add_boundary_loads(load: Load, reduced: "_Reduced", acting: list[Any]) -> Load:
+    """Return the load with what prescribed motions and absorbing boundaries add to it.
+
+    Args:
+        load: of tractions, body forces and the like.
+        reduced: equations of the free unknowns, whose prescribed motions act as loads.
+        acting: loads of absorbing boundaries.
+    """
+    viscous = chain.from_iterable(boundary.viscous for boundary in acting)
+    elastic = chain.from_iterable(boundary.elastic for boundary in acting)
+    return replace(
+        load,
+        inertial=reduced.inertial,
+        viscous=(*reduced.viscous, *viscous),
+        general=(*load.general, *reduced.elastic, *elastic),
+    )
 
 
 def _choose_forms(
@@ -352,8 +400,13 @@ def _gather_companions(
         acting: loads of absorbing boundaries.
 
     Raises:
-        InputError: there are such motions beside a body that is not linear.
+        InputError: there are such motions, or compressible water, beside a body that is not linear.
     """
+    if body.space.water is not None and body.internal is not None:
+        raise InputError(
+            f"Reservoir: model 'acoustic' is before linear bodies, and {body.nonlinear} is not "
+            "linear: give 'incompressible' or 'added mass'"
+        )
     companions = [companion for part in (*prescribed, *acting) for companion in part.companions]
     if companions and body.internal is not None:
         raise InputError(
@@ -425,7 +478,24 @@ def _reduce(
     if water is not None:
         mass = _add_water(mass, water, momenta, elimination, directions)
     M, inertial = _eliminate(mass, elimination, algebra, motions[2])
+    if space.water is not None:
+        M, C, K = (
+            space.water.join(name, part, algebra) for name, part in (("M", M), ("C", C), ("K", K))
+        )
+        if momenta is not None:
+            space.water.add_momenta(momenta)
+        if space.moves:
+            inertial = (*inertial, space.water.make_load())
     return _Reduced(M, C, K, elastic, viscous, inertial, momenta)
+
+
+def _weigh_water(space: FemSpace, reservoir: Reservoir | None, thickness: float) -> Any:
+    """Return the mass of the water on the components of the face (PETSc), or None. Collective."""
+    if reservoir is None:
+        return None
+    if space.water is not None:
+        return space.water.mass_of_face()
+    return reservoir.assemble_mass(space, thickness)
 
 
 def _add_water(

@@ -28,6 +28,7 @@ class Elimination:
     Attributes:
         free: (full,) mask of the owned free components.
         held: (full,) mask of the owned components that are prescribed.
+        others: how many unknowns of this rank follow that are no components of nodes.
     """
 
     def __init__(
@@ -45,11 +46,16 @@ class Elimination:
         """
         self.free = free
         self.held = held
+        self.others = 0
         self._P = None if followed is None else _make_selection(comm, free, followed, unknowns)
 
     def restrict(self, full: Array) -> Array:
         """Restrict nodal values (owned nodes, d) to the free vector."""
-        return full.ravel()[self.free]
+        return self._make_room(full.ravel()[self.free])
+
+    def _make_room(self, values: Array) -> Array:
+        """Return a free vector of components of nodes with zeros for the others."""
+        return np.concatenate([values, np.zeros(self.others)]) if self.others else values
 
     def expand(self, u: Array, values: Array) -> Array:
         """Return P u + U, a full vector.
@@ -59,14 +65,16 @@ class Elimination:
             values: (full,) U at the held components, zero elsewhere; it is overwritten.
         """
         if self._P is None:
-            values[self.free] = u
+            values[self.free] = u[: len(u) - self.others]
         else:
             values += self._P @ u
         return values
 
     def pull(self, force: Array) -> Array:
         """Return Pᵀ f, forces on the free components; tied nodes count at their partners."""
-        return force[self.free] if self._P is None else self._P.transpose_apply(force)
+        if self._P is not None:
+            return self._P.transpose_apply(force)
+        return self._make_room(force[self.free])
 
     def reduce(self, full: Any) -> Any:
         """Return PᵀAP of a PETSc matrix of all components, a new one. Collective."""

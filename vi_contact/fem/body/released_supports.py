@@ -73,7 +73,8 @@ def release(
     # unknowns that some support has held before may have lost it, and those beside an added one
     spaces = [_spaces(stage, problem)[0] for stage in (static, *earlier)]
     held = [space.held | np.isin(space.nodes, space.tied_nodes)[:, None] for space in spaces]
-    was_held = np.any([*held, _beside(after, added)], axis=0).ravel()[after.free]
+    any_held = np.any([*held, _beside(after, added)], axis=0)
+    was_held = after.restrict(any_held.astype(float)) > 0.0
     force = _compute_missing(problem, u0, first, was_held)
     return begin_from(problem, u0, still, state, force)
 
@@ -221,7 +222,7 @@ def find_removed_support(
     old, new = _spaces(before, after)
     candidates = [("", 0.0)]
     nodal = np.zeros(new.held.size)
-    nodal[new.free] = force
+    nodal[new.free] = force[: np.count_nonzero(new.free)]
     # forces that are round-off of these are none
     size = largest(new.comm, max(max_abs(elastic), max_abs(force)))
     # of each support, and of the ties that are gone, what of the force is on what it held

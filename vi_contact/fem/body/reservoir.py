@@ -10,6 +10,8 @@ acceleration a is pressed by more, and this is a mass M_w beside that of the bod
 - "incompressible": the exact pressure of incompressible water before this face, by Laplace's
   equation (``water_pressure``). A rigid wall then feels 0.5428 rho a h², Westergaard's formula
   gives 7/12 = 0.5833.
+- "acoustic": compressible water, whose waves leave at the far end and through the bottom. It has
+  unknowns of its own beside those of the body (``acoustic_water``, ``water_unknowns``).
 
 The water moves with the ground sideways, and does not weigh: a horizontal acceleration r of the
 ground is a load -(M + M_w) r, a vertical one -M r, and so is the weight. Damping by alpha M does
@@ -20,27 +22,31 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
-import scipy.sparse as sp
 import ufl
 
-from ...core.algebra import Array, largest
+from ...core.algebra import largest
 from ...core.arguments import check_fields
 from ...core.checks import instance, optional, quote
 from ...core.errors import InputError
-from ...core.quantities import RATIO, Finite, NotNegative, Positive, Unit
+from ...core.quantities import RATIO, Between, Finite, NotNegative, Positive, Unit
 from ...core.units import STANDARD_GRAVITY, WATER_WEIGHT
 from .. import compat
-from ..matrices.petsc_rows import aij_of, rows_of
 from ..mesh.group_checks import facets_of
 from ..mesh.tagged_mesh import Facets
+from .acoustic_water import WaterData
 from .loads import Pressure
 from .space import FemSpace
 from .water_pressure import find_compliance
+from .water_unknowns import AcousticWater
+from .wet_face import ALIKE, WetFace
 
-MODELS = ("added mass", "incompressible", "at rest")
+MODELS = ("added mass", "incompressible", "acoustic", "at rest")
+FAR_ENDS = ("open", "closed")
 WESTERGAARD = 0.875
 QUADRATURE = 8  # degree, for the root of the depth
-ALIKE = 1e-9  # of the depth: nodes of one height
+FAR = 5.0  # of the depth: distance of the far end
+SPEED_OF_SOUND = 1440.0  # of water [m/s]
+OF_ACOUSTIC = {"speed": SPEED_OF_SOUND, "reflection": 1.0, "far_end": "open", "highest": None}
 
 
 @dataclass(frozen=True)
@@ -50,7 +56,8 @@ class Reservoir:
     Args:
         face: the wet face of the body.
         level: height of the water level [m], on the last axis of the mesh.
-        model: "added mass", "incompressible", or "at rest" for the pressure at rest alone.
+        model: "added mass", "incompressible", "acoustic", or "at rest" for the pressure at rest
+            alone.
         floor: bottom of the reservoir, which the water presses too; None: it has none.
         tail_face: face of the tail water, at rest; given with ``tail``.
         tail: height of the tail water [m].
@@ -58,7 +65,13 @@ class Reservoir:
         silt_weight: weight of the silt under water, gamma' [N/m³].
         silt_ratio: K, its horizontal pressure over the vertical one.
         gamma: weight of the water [N/m³].
-        length: distance of the far end [m], of "incompressible" water; 5 times the depth when None.
+        length: distance of the far end from the foot of the face [m], of "incompressible" and
+            "acoustic" water; 5 times the depth when None.
+        speed: c of "acoustic" water [m/s].
+        reflection: alpha of the bottom of "acoustic" water, from 0 for one that takes all of a wave
+            at right angles to 1 for a rigid one.
+        far_end: of "acoustic" water, "open" to waves that leave, or "closed" by a wall at rest.
+        highest: frequency [Hz] up to which "acoustic" water is compressible; 8 c/4h when None.
     """
 
     face: Facets
@@ -72,21 +85,26 @@ class Reservoir:
     silt_ratio: Annotated[float, NotNegative, RATIO, "silt_ratio"] = 0.5
     gamma: Annotated[float, Positive, Unit("N/m³"), "gamma"] = WATER_WEIGHT
     length: Annotated[float | None, Positive, Unit("m"), "the length"] = None
+    speed: Annotated[float, Positive, Unit("m/s"), "the speed of sound"] = SPEED_OF_SOUND
+    reflection: Annotated[float, Between(0.0, 1.0), RATIO, "the reflection of the bottom"] = 1.0
+    far_end: str = "open"
+    highest: Annotated[float | None, Positive, Unit("Hz"), "the highest frequency"] = None
 
     def __post_init__(self) -> None:
         check_fields(self)
         facets_of("Reservoir", "face", self.face)
         for name in ("floor", "tail_face"):
             optional(facets_of, "Reservoir", name, getattr(self, name))
-        if self.model == "acoustic":
-            raise InputError(
-                "Reservoir: model 'acoustic', compressible water, is not there yet: give "
-                "'incompressible', which is exact for slow motions, or 'added mass'"
-            )
         if self.model not in MODELS:
             raise InputError(
                 f"Reservoir: model is {quote(self.model)}; give {' or '.join(map(quote, MODELS))}"
             )
+        if self.far_end not in FAR_ENDS:
+            raise InputError(
+                f"Reservoir: far_end is {quote(self.far_end)}; give "
+                f"{' or '.join(map(quote, FAR_ENDS))}"
+            )
+        self._refuse_unread()
         if (self.tail is None) != (self.tail_face is None):
             raise InputError(
                 "Reservoir: tail and tail_face belong together: give the level of the tail water "
@@ -96,6 +114,20 @@ class Reservoir:
             raise InputError(
                 f"Reservoir: the tail water at {self.tail:g} m is above the level {self.level:g} "
                 "m: exchange face and tail_face"
+            )
+
+    def _refuse_unread(self) -> None:
+        """Raise InputError for what the model does not read."""
+        given = [name for name, usual in OF_ACOUSTIC.items() if getattr(self, name) != usual]
+        if given and self.model != "acoustic":
+            raise InputError(
+                f"Reservoir: {given[0]} is for compressible water, and the model is "
+                f"{quote(self.model)}: give model 'acoustic', or leave {given[0]} out"
+            )
+        if self.length is not None and self.model in ("added mass", "at rest"):
+            raise InputError(
+                f"Reservoir: length is for 'incompressible' and 'acoustic' water, and the model is "
+                f"{quote(self.model)}: leave it out"
             )
 
     def make_loads(self) -> list[Pressure]:
@@ -109,6 +141,17 @@ class Reservoir:
         if self.tail_face is not None and self.tail is not None:
             loads.append(Pressure(self.tail_face, self._press_at(self.tail, self.gamma)))
         return loads
+
+    def name_loads(self) -> list[str]:
+        """Return what the loads of ``make_loads`` are, such as "silt on 'face'"."""
+        names = [f"water on '{self.face.name}'"]
+        if self.floor is not None:
+            names.append(f"water on '{self.floor.name}'")
+        if self.silt is not None:
+            names.append(f"silt on '{self.face.name}'")
+        if self.tail_face is not None:
+            names.append(f"tail water on '{self.tail_face.name}'")
+        return names
 
     def _press_at(self, level: float, weight: float) -> Any:
         """Return the function (points, t) -> weight max(level - y, 0) [Pa]."""
@@ -125,17 +168,7 @@ class Reservoir:
             InputError: a level above the face or below it, and faces that the model does not take.
         """
         bottom, top = self._find_ends(space)
-        if self.level > top + ALIKE * (top - bottom):
-            raise InputError(
-                f"Reservoir: the level {self.level:g} m is above the top of '{self.face.name}' at "
-                f"{top:g} m: water that flows over is not modelled, so give a lower level"
-            )
-        if self.level <= bottom:
-            raise InputError(
-                f"Reservoir: the level {self.level:g} m is below the foot of '{self.face.name}' at "
-                f"{bottom:g} m: give a higher level, or leave the reservoir out"
-            )
-        if self.model == "at rest":
+        if self.model in ("at rest", "acoustic"):
             return None
         if self.model == "added mass":
             return self._assemble_westergaard(space, bottom, thickness)
@@ -147,10 +180,25 @@ class Reservoir:
         return self.gamma / STANDARD_GRAVITY
 
     def _find_ends(self, space: FemSpace) -> tuple[float, float]:
-        """Return the lowest and the highest height [m] of nodes of the face. Collective."""
+        """Return the lowest and the highest height [m] of nodes of the face. Collective.
+
+        Raises:
+            InputError: a level above the face or below it.
+        """
         heights = space.points[space.facet_blocks(self.face.indices), -1]
-        low = -largest(space.comm, np.max(-heights, initial=-np.inf))
-        return low, largest(space.comm, np.max(heights, initial=-np.inf))
+        bottom = -largest(space.comm, np.max(-heights, initial=-np.inf))
+        top = largest(space.comm, np.max(heights, initial=-np.inf))
+        if self.level > top + ALIKE * (top - bottom):
+            raise InputError(
+                f"Reservoir: the level {self.level:g} m is above the top of '{self.face.name}' at "
+                f"{top:g} m: water that flows over is not modelled, so give a lower level"
+            )
+        if self.level <= bottom:
+            raise InputError(
+                f"Reservoir: the level {self.level:g} m is below the foot of '{self.face.name}' at "
+                f"{bottom:g} m: give a higher level, or leave the reservoir out"
+            )
+        return bottom, top
 
     def _assemble_westergaard(self, space: FemSpace, bottom: float, thickness: float) -> Any:
         """Return ∫ 7/8 rho sqrt(h (h - y)) (u·n)(v·n). Collective."""
@@ -170,81 +218,64 @@ class Reservoir:
 
         Collective.
         """
+        wet = self._find_wet_face(space, thickness)
+        G = np.zeros((wet.nodes, wet.nodes))
+        G[np.ix_(wet.below, wet.below)] = find_compliance(
+            wet.x, wet.y, wet.side, self.length or FAR * wet.depth
+        )[:-1, :-1]
+        # S has the thickness on both sides, and the water has it once
+        return wet.spread(space, self.density / thickness * G)
+
+    def _find_wet_face(self, space: FemSpace, thickness: float) -> WetFace:
+        """Return the wet face of "incompressible" and "acoustic" water. Collective."""
         if space.dimension != 2:
             raise InputError(
-                "Reservoir: model 'incompressible' is for the plane: give 'added mass' in space"
+                f"Reservoir: model {quote(self.model)} is for the plane: give 'added mass' in space"
             )
+        return WetFace(space, self.face, self.level, thickness)
 
-        # S: forces [m²] on all components of a pressure of one at each node, ∫ psi_j n_c N_i.
-        g = ufl.TrialFunction(space.V)
-        v = ufl.TestFunction(space.V)
-        n = ufl.FacetNormal(space.mesh)
-        measure = compat.measure(space.mesh, space.mesh.topology.dim - 1, self.face.indices)
-        form = thickness * ufl.inner(g[0] * n, v) * measure
-        mat = compat.assemble_matrix(space.compile_form(form))
-        own = rows_of(mat).tocoo()
-        first = mat.getOwnershipRange()[0]
-        size = mat.getSize()[1]
-        columns = mat.getLocalSize()[1]
-        mat.destroy()
-
-        # All ranks know the face: its nodes from the floor up, and S.
-        blocks = space.facet_blocks(self.face.indices)
-        numbers = first + space.dimension * blocks
-        parts = space.comm.bcast(
-            space.comm.gather((numbers, space.points[blocks], own.row + first, own.col, own.data))
-        )
-        number, points, rows, places, values = (
-            np.concatenate([part[k] for part in parts]) for k in range(5)
-        )
-        order = np.argsort(points[:, 1], kind="stable")
-        number = number[order]
-        points = points[order]
-        S = sp.csr_matrix((values, (rows, places)), shape=(size, size))
-
-        G = self._find_compliance(S, number, points)
-        touched = np.unique(rows)
-        of_face = S[touched][:, number].toarray()
-        # S has the thickness on both sides, and the water has it once
-        dense = self.density / thickness * (of_face @ G @ of_face.T)
-        mine = (touched >= first) & (touched < first + own.shape[0])
-        place = np.repeat(touched[mine] - first, len(touched))
-        added = sp.csr_matrix(
-            (dense[mine].ravel(), (place, np.tile(touched, int(mine.sum())))),
-            shape=(own.shape[0], size),
-        )
-        return aij_of(added, space.mesh.comm, columns)
-
-    def _find_compliance(self, S: Any, number: Array, points: Array) -> Array:
-        """Return G (k, k) of all nodes of the face, zero above the level.
+    def make_water(self, space: FemSpace, thickness: float) -> AcousticWater:
+        """Return compressible water, whose unknowns are added to those of the body. Collective.
 
         Args:
-            S: forces of nodal pressures.
-            number: their rows of the first component (k,), from the floor up.
-            points: (k, 2) [m].
+            space: the body's unknowns.
+            thickness: of the section [m].
+
+        Raises:
+            InputError: tied sides, bodies that come and go by stages, and what ``assemble_mass``
+                refuses.
         """
-        depth = self.level - points[0, 1]
-        if np.any(np.diff(points[:, 1]) <= ALIKE * depth):
-            raise InputError(
-                f"Reservoir: '{self.face.name}' has two nodes at one height: 'incompressible' "
-                "water needs a face that goes up all the way, so name its floor apart"
-            )
-        wet = np.flatnonzero(points[:, 1] < self.level - ALIKE * depth)
-        x = points[wet, 0]
-        y = points[wet, 1]
+        parts = {"tied sides": space.ties, "bodies that come and go by stages": space.absent}
+        for what, found in parts.items():
+            if found is not None and len(found):
+                raise InputError(
+                    f"Reservoir: model 'acoustic' does not go with {what}: give 'incompressible' "
+                    "or 'added mass'"
+                )
+        self._find_ends(space)
+        wet = self._find_wet_face(space, thickness)
+        data = WaterData(
+            density=self.density,
+            speed=self.speed,
+            reflection=self.reflection,
+            open_end=self.far_end == "open",
+            length=self.length or FAR * wet.depth,
+            highest=self.highest,
+            thickness=thickness,
+        )
+        return AcousticWater(space, wet, data)
 
-        # A node of the water at the level: that of the face, or one on the line to the next node.
-        end = points[wet[-1] + 1]
-        share = (self.level - y[-1]) / (end[1] - y[-1])
-        x = np.append(x, x[-1] + share * (end[0] - x[-1]))
-        y = np.append(y, self.level)
 
-        # n is out of the body, and so into the water.
-        side = 1.0 if S[:, number].sum(axis=1)[number].sum() > 0.0 else -1.0
-        length = self.length or 5.0 * depth
-        G = np.zeros((len(points), len(points)))
-        G[np.ix_(wet, wet)] = find_compliance(x, y, side, length)[:-1, :-1]
-        return G
+def add_water(reservoir: Reservoir | None, space: FemSpace, thickness: float) -> None:
+    """Give the unknowns of a body those of compressible water, if there is some. Collective.
+
+    Args:
+        reservoir: the reservoir, or None.
+        space: the body's unknowns, which are changed.
+        thickness: of the section [m].
+    """
+    if reservoir is not None and reservoir.model == "acoustic":
+        space.water = reservoir.make_water(space, thickness)
 
 
 def list_pressures(reservoir: Any) -> list[Pressure]:

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.algebra import Array, Indices, Mask, from_each, total
+from ...core.algebra import Array, Indices, Mask, from_each, largest, total
 from ...core.checks import instance, refuse
 from ...core.errors import InputError
 from ...core.system import SemiDiscreteSystem
@@ -134,6 +134,7 @@ class FemSpace(NodalSpace):
         forms: the ElasticForms of the system made on it; stress output needs them.
         absent: which local cells are absent (``body.absent``); None where none ever are.
         stands: (k, d) where supports hold nodes that an earlier stage had moved [m], or None.
+        water: compressible water with unknowns of its own (``water_unknowns``), or None.
     """
 
     def __init__(
@@ -212,6 +213,9 @@ class FemSpace(NodalSpace):
         self.forms: Any = None
         self.stands: Array | None = None
         self.absent = absent
+        self.water: Any = None
+        self._others_at = np.zeros((0, self.dimension))
+        self._others_of = np.zeros(0, dtype=np.int64)
 
     @property
     def translations(self) -> list[Array]:
@@ -248,6 +252,11 @@ class FemSpace(NodalSpace):
         nodes = self.node_of_block[facet_rows(self.V, facets)]
         # vertices come first: as many as a facet of a tetrahedron has
         return nodes if self.hierarchy is None else nodes[:, : self.dimension]
+
+    @property
+    def outlets(self) -> Mask | None:
+        """Return the unknowns (n,) of water that leaves the reservoir, None without any."""
+        return None if self.water is None else self.water.outlets
 
     @cached_property
     def hierarchy(self) -> Hierarchy | None:
@@ -347,13 +356,33 @@ class FemSpace(NodalSpace):
             return nodes
         return np.array([self._leader.get(n, n) for n in nodes.tolist()], dtype=np.int64)
 
+    def add_unknowns(self, count: int, point: Array, body: int) -> None:
+        """Add unknowns that are no displacements after those of nodes. Collective.
+
+        Each counts as a node by itself, after all nodes. Only the last rank may add some, so that
+        the numbers of all others stay.
+
+        Args:
+            count: how many this rank adds.
+            point: (d,) where they are taken to be [m].
+            body: of which they are a part.
+        """
+        last = int(largest(self.comm, np.max(self.node_of_block, initial=0)))
+        more = self.dimension * (last + 1 + np.arange(count))
+        self.ids = np.concatenate([self.ids, more])
+        self.unknowns += int(total(self.comm, count))
+        self.elimination.others = count
+        self._others_at = np.tile(point, (count, 1))
+        self._others_of = np.full(count, body, dtype=np.int64)
+
     # Free unknowns
     # ----------------------------------------------------------------------------------------------
 
     @property
     def coordinates(self) -> Array:
         """Return the positions (rows, d) of the nodes of the free unknowns [m]."""
-        return np.asarray(np.repeat(self.points, self.dimension, axis=0)[self.free])
+        of_nodes = np.repeat(self.points, self.dimension, axis=0)[self.free]
+        return np.concatenate([of_nodes, self._others_at]) if len(self._others_at) else of_nodes
 
     @property
     def body_of_node(self) -> Indices:
@@ -366,7 +395,8 @@ class FemSpace(NodalSpace):
     @property
     def bodies(self) -> Indices:
         """Return the body of every free unknown."""
-        return np.asarray(np.repeat(self.body_of_node, self.dimension)[self.free])
+        of_nodes = np.repeat(self.body_of_node, self.dimension)[self.free]
+        return np.concatenate([of_nodes, self._others_of]) if len(self._others_of) else of_nodes
 
     # Vectors
     # ----------------------------------------------------------------------------------------------

@@ -130,6 +130,10 @@ class StrainPoints:
         values = self._field.x.array
         values[: full.size] = full.ravel()
         self._field.x.scatter_forward()
+        return self.strain_of(values)
+
+    def strain_of(self, values: Array) -> Array:
+        """Return eps (points, n) of all components (local nodes d,) [m], ghosts among them."""
         own = values[self._dofs][:, :, None]
         return np.matmul(self._B, own).reshape(-1, self.components)
 
@@ -139,13 +143,17 @@ class StrainPoints:
 
     def force(self, sigma: Array) -> Array:
         """Return p (n,) [N] of stresses (points, n) [Pa]. Collective."""
+        return self._space.pull(self.nodal_force(sigma))
+
+    def nodal_force(self, sigma: Array) -> Array:
+        """Return p (owned nodes d,) [N] of stresses (points, n) [Pa], held ones too. Collective."""
         weighted = (self.weights.reshape(-1, 1) * sigma).reshape(self.cells, 1, -1)
         own = np.matmul(weighted, self._B).reshape(self.cells, -1)
         values = self._field.x.array
         values[:] = np.bincount(self._dofs.ravel(), own.ravel(), len(values))
         compat.add_to_owners(self._field)
         owned = len(self._space.nodes) * self._space.dimension
-        return self._space.pull(np.array(values[:owned]))
+        return np.array(values[:owned])
 
     def free_matrix(self, D: Array) -> Any:
         """Return K of the free unknowns of tangents D (points, n, n) [Pa]. Collective."""

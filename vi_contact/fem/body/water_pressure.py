@@ -36,7 +36,7 @@ def find_compliance(x: Array, y: Array, side: float, length: float) -> Array:
     far = x[0] + side * length
     columns = x[None, :] + (way / way[-1])[:, None] * (far - x)[None, :]
     heights = np.broadcast_to(y, columns.shape)
-    K = _assemble(columns.ravel(), heights.ravel(), len(way), layers)
+    K, _ = assemble_grid(columns.ravel(), heights.ravel(), len(way), layers)
     held = np.zeros(columns.shape, dtype=bool)
     held[:, -1] = True
     free = np.flatnonzero(~held.ravel())
@@ -58,8 +58,10 @@ def _divide(length: float, first: float, largest: float) -> Array:
     return np.array(places) * (length / places[-1])
 
 
-def _assemble(x: Array, y: Array, columns: int, layers: int) -> sp.csr_matrix:
-    """Return ∫ grad psi_i · grad psi_j of bilinear quadrilaterals.
+def assemble_grid(
+    x: Array, y: Array, columns: int, layers: int
+) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+    """Return ∫ grad psi_i · grad psi_j and ∫ psi_i psi_j of bilinear quadrilaterals.
 
     Args:
         x: of the nodes (columns · layers,) [m], column after column.
@@ -71,6 +73,7 @@ def _assemble(x: Array, y: Array, columns: int, layers: int) -> sp.csr_matrix:
     corners = [number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]]
     cells = np.column_stack([corner.ravel() for corner in corners])
     entries = np.zeros((len(cells), 4, 4))
+    squares = np.zeros((len(cells), 4, 4))
     for r, s in ((-GAUSS, -GAUSS), (GAUSS, -GAUSS), (GAUSS, GAUSS), (-GAUSS, GAUSS)):
         in_r = 0.25 * np.array([s - 1.0, 1.0 - s, 1.0 + s, -1.0 - s])
         in_s = 0.25 * np.array([r - 1.0, -1.0 - r, 1.0 + r, 1.0 - r])
@@ -82,6 +85,14 @@ def _assemble(x: Array, y: Array, columns: int, layers: int) -> sp.csr_matrix:
         weight = np.abs(area)[:, None, None]
         entries += weight * (in_x[:, :, None] * in_x[:, None, :])
         entries += weight * (in_y[:, :, None] * in_y[:, None, :])
+        in_cell = 0.25 * np.outer([1.0 - s, 1.0 + s], [1.0 - r, 1.0 + r]).ravel()
+        values = in_cell[[0, 1, 3, 2]]
+        squares += weight * np.outer(values, values)
     rows = np.repeat(cells, 4, axis=1).ravel()
     places = np.tile(cells, (1, 4)).ravel()
-    return sp.csr_matrix((entries.ravel(), (rows, places)), shape=(len(x), len(x)))
+    shape = (len(x), len(x))
+    first, second = (
+        sp.csr_matrix((values.ravel(), (rows, places)), shape=shape)
+        for values in (entries, squares)
+    )
+    return first, second

@@ -241,6 +241,10 @@ class YieldingForce:
         """Return p(u) (n,) [N]. Collective."""
         return self._points.force(self._reach(u).sigma)
 
+    def stress(self, u: Array) -> Array:
+        """Return sigma (points, n) [Pa] at a displacement, in Mandel's notation. Collective."""
+        return self._reach(u).sigma
+
     def energy(self, u: Array) -> float:
         """Return W(u) [J] with hardening, of all ranks. Collective."""
         reached = self._reach(u)

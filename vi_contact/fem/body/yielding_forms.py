@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import ufl
 
-from ...core.algebra import Array, total
+from ...core.algebra import Array, Mask, total
 from ...core.errors import InputError
 from ...core.internal import InternalForce
 from ...laws.drucker_prager import DruckerPrager
@@ -107,6 +107,31 @@ class YieldingForms(ElasticForms):
         form = self.fields["alpha_rho"] * ufl.inner(self.u, self.v) * ufl.dx
         return form + self._viscous_form() if self.viscous else form
 
+    def find_damping_row(self, values: Array, inside: Mask) -> Array:
+        """Return the part of rᵀC that is of the elastic stiffness, (owned nodes d,). Collective.
+
+        Args:
+            values: r (local nodes d,), ghosts among them.
+            inside: (local cells,) the cells that count.
+        """
+        points = self._points
+        eps = points.strain_of(values) * _repeat(points, inside)
+        sigma = np.zeros_like(eps)
+        for part, beta in zip(self._parts, self._betas, strict=True):
+            sigma[part.points] = beta * eps[part.points] @ part.law.stiffness(points.components)
+        return points.nodal_force(sigma)
+
+    def find_stress_row(self, values: Array, inside: Mask) -> Array:
+        """Return w (B r) (points, n) [m³], whose product with stresses is their work on r.
+
+        Args:
+            values: r (local nodes d,), ghosts among them.
+            inside: (local cells,) the cells that count.
+        """
+        points = self._points
+        eps = points.strain_of(values) * _repeat(points, inside)
+        return points.weights.reshape(-1, 1) * eps
+
     def stresses(self, u: Any) -> tuple[Any, Any]:
         """Return the elastic stress of the trial function; refuse the stress of a displacement.
 
@@ -119,6 +144,11 @@ class YieldingForms(ElasticForms):
             "the stress of a material that yields depends on its past: read it from the memory of "
             "a state, as docs/guide/yielding.md shows"
         )
+
+
+def _repeat(points: StrainPoints, inside: Mask) -> Array:
+    """Return one (points, 1) where the cell of a point counts, else zero."""
+    return np.repeat(np.asarray(inside[: points.cells], dtype=float), points.each)[:, None]
 
 
 def refuse_beside(space: FemSpace, materials: Sequence[Any], section: Section) -> None:

@@ -46,6 +46,7 @@ from .hinges import find_hinges, refuse_hinges
 from .matching import Matched, Matching, NodeToNode, Side
 from .nodes import Nodes, everywhere, join_nodes
 from .present import is_there, keep_present
+from .skin import ROUND_OFF
 from .surface import contact_space, find_listed, make_prescribed_motion, merge_tied, nodes_on
 from .watching import Watched, sort_held, watch_nodes
 
@@ -695,7 +696,10 @@ def _measure_gap(
         InputError: a larger overlap.
     """
     gap = np.sum((matched.P @ side2.nodes.points - nodes.points) * directions, axis=1)
-    behind = -gap - np.maximum(matched.overlap, 1e-12 * space.size)
+    # rounding is that of the mesh's size, or of coordinates where the mesh lies far from the origin
+    far = float(np.abs(side2.nodes.points).max(initial=0.0))
+    rounding = max(1e-12 * space.size, ROUND_OFF * far)
+    behind = -gap - np.maximum(matched.overlap, rounding)
     if behind.max() > 0.0:
         worst = int(np.argmax(behind))
         raise InputError(
@@ -704,7 +708,7 @@ def _measure_gap(
             ": the bodies overlap there, or these are not the boundaries between them; choose the "
             f"sides that face, or {PRESS_FIT}"
         )
-    if gap.min() < -1e-12 * space.size and space.comm.rank == 0:
+    if gap.min() < -rounding and space.comm.rank == 0:
         log.warning(
             "'%s' and '%s' overlap by up to %.3g m: they count as touching there",
             name,

@@ -26,10 +26,10 @@ def keep_present(
     """
     if space.absent is None:
         return facets1, facets2
-    there1 = _find_present(space, facets1)
+    there1 = find_present(space, facets1)
     if facets2 is None:
         return _pick(facets1, there1), None
-    there2 = _find_present(space, facets2)
+    there2 = find_present(space, facets2)
     middles = np.concatenate(from_each(space.comm, _find_middles(space, facets2)))
     flags = np.concatenate(from_each(space.comm, there2))
     if len(middles) and len(facets1.indices):
@@ -45,9 +45,10 @@ def is_there(space: FemSpace, facets: Facets) -> bool:
     return space.absent is None or total(space.comm, len(facets.indices)) > 0.0
 
 
-def _find_present(space: FemSpace, facets: Facets) -> Mask:
+def find_present(space: FemSpace, facets: Facets) -> Mask:
     """Return which facets (k,) have a present cell on this rank."""
-    assert space.absent is not None
+    if space.absent is None:
+        return np.ones(len(facets.indices), dtype=bool)
     dim = space.mesh.topology.dim
     space.mesh.topology.create_connectivity(dim - 1, dim)
     beside = space.mesh.topology.connectivity(dim - 1, dim)

@@ -54,6 +54,11 @@ class NodalSpace:
         """Return the change to unknowns of a hierarchy (``body.hierarchical``), or None."""
         return None
 
+    @property
+    def outlets(self) -> Mask | None:
+        """Return which unknowns (n,) meet dashpots alone, which natural modes hold, or None."""
+        return None
+
     def expand(self, u: Array, t: float, derivative: int = 0) -> Array:
         """Return the displacements of owned nodes (k, d), or their rates, of a vector of unknowns.
 

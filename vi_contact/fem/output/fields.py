@@ -4,8 +4,9 @@ Nodes and cells are in the order of the input mesh. Every file is replaced as a 
 names only frames that are complete, so that ParaView can open it at any moment, also while the run
 goes on or after it was killed. Nothing in the files depends on the number of ranks.
 
-What a frame holds: docs/reference/files.md. In the first one a is zero, and with friction all
-closed nodes stick.
+Bodies that are absent, not yet placed or removed, are left out with the nodes that are theirs
+alone: the others keep their order. What a frame holds: docs/reference/files.md. In the first one a
+is zero, and with friction all closed nodes stick.
 """
 
 import logging
@@ -209,6 +210,28 @@ class Grid:
     owners: Indices
 
 
+@dataclass(frozen=True)
+class Kept:
+    """Hold which nodes and cells of a mesh frames have, on rank 0, where bodies may be absent.
+
+    Attributes:
+        nodes: (k,) their numbers in the order of the input mesh; none on other ranks.
+        cells: (c,) likewise.
+    """
+
+    nodes: Indices
+    cells: Indices
+
+    def keep_grid(self, whole: Grid) -> Grid:
+        """Return the part of a grid that is kept, with nodes counted anew."""
+        return Grid(
+            whole.kind,
+            whole.points[self.nodes],
+            np.searchsorted(self.nodes, whole.cells[self.cells]),
+            whole.owners[self.cells],
+        )
+
+
 class FrameValues:
     """Compute what a frame holds, on all ranks, and hand it to rank 0.
 
@@ -257,12 +280,19 @@ class FrameValues:
         self._cell_numbers = cells.numbers
         self._von_mises = cells.von_mises
         owners = np.full(len(cells.numbers), space.comm.rank)
-        self.grid = Grid(
+        whole = Grid(
             cells.kind,
             on_first(space.comm, space.nodes, _pad_axes(space.points)),
             on_first(space.comm, cells.numbers, cells.nodes),
             on_first(space.comm, cells.numbers, owners),
         )
+        absent = getattr(space, "absent", None)
+        self._kept: Kept | None = None
+        self.grid = whole
+        if absent is not None:
+            there = on_first(space.comm, cells.numbers, ~absent[: len(cells.numbers)])
+            self._kept = Kept(np.unique(whole.cells[there]), np.flatnonzero(there))
+            self.grid = self._kept.keep_grid(whole)
 
     def gather(
         self, state: State, acceleration: Array, report: Report | None
@@ -307,6 +337,9 @@ class FrameValues:
             for name, values in self.own.gather_values(state).items():
                 place = cellwise if self.own.kinds[name].in_cells else nodal
                 place[name] = values
+        if self._kept is not None and self.comm.rank == 0:
+            nodal = {name: values[self._kept.nodes] for name, values in nodal.items()}
+            cellwise = {name: values[self._kept.cells] for name, values in cellwise.items()}
         return nodal, cellwise
 
     def _gather_points(self, state: State) -> dict[str, Array]:

@@ -4,6 +4,10 @@ The nodal forces that hold a group of cells in its motion are q = K u + C v + M 
 cells alone, with a the absolute acceleration and f their loads. For a nodal field r, rᵀq is a
 number, and as K, C, M are symmetric it is (K r)ᵀu + (C r)ᵀv + (M r)ᵀa - rᵀf: three sparse products
 a step, however many cells there are. With a unit translation or rotation as r it is a resultant.
+
+Where materials yield, the stress is not K u. Then ∑ w (B r):sigma over the points of integration of
+the group is in the place of (K r)ᵀu, with the stress that a state remembers; in a step it is that
+of both ends, with the weights that the equation of motion has there.
 """
 
 import logging
@@ -18,6 +22,7 @@ import ufl
 from ...core.algebra import Array, Mask
 from ...core.checks import array, instance, optional
 from ...core.errors import InputError
+from ...core.internal import remembers
 from ...core.problem import ContactProblem
 from ...core.step import Balance, Report, State
 from .. import compat
@@ -75,11 +80,13 @@ class NodalWork:
 
         Raises:
             InputError: another system, loads on another mesh, a gravity of another dimension, and
-                a body that is not linear.
+                a body that is neither linear nor of materials that yield.
         """
-        problem.system.refuse_nonlinear(
-            owner, "leave them out, and integrate the stress of the body yourself"
-        )
+        self._yields = remembers(problem.system.internal)
+        if not self._yields:
+            problem.system.refuse_nonlinear(
+                owner, "leave them out, and integrate the stress of the body yourself"
+            )
         space = space_of("NodalWork", problem.system)
         warn_of_other_matrices("reactions and section forces", problem.system, "MCK")
         self._problem = problem
@@ -97,9 +104,10 @@ class NodalWork:
         self._r = compat.function(space.V)
         self._inside = compat.function(compat.cell_space(space.mesh))
         self._forms: list[Any] = []
+        linear = not self._yields
         for name in ("K", "C", "M"):
             form = None
-            if name != "C" or space.forms.damped:
+            if name == "M" or (name == "C" and space.forms.damped) or (name == "K" and linear):
                 form = space.compile_form(space.forms.against(name, self._r, self._inside))
             self._forms.append(form)
         self._initial = [] if space.forms.initial is None else [space.forms.initial]
@@ -171,19 +179,7 @@ class NodalWork:
                 unknown.
         """
         space = self.space
-        if self._nodal and any(
-            cells is not None or beyond is not None for _, _, cells, beyond in parts
-        ):
-            raise InputError(
-                "section forces: the part of a LinearForm on the cells of a cut is unknown; give "
-                "these loads as Traction and BodyForce, or record Reactions"
-            )
-        if not space.forms.densities and any(beyond for *_, beyond in parts):
-            raise InputError(
-                "a section goes through elements, and with forms=… the mass of their parts is "
-                "unknown: let it run along element sides, or give a material for the density in "
-                "place of mass="
-            )
+        self._check_parts(parts)
         # of each row of works one for every motion, and how far held nodes move obstacles then
         forms = [*self._forms, *self._load_forms]
         rows: list[list[Any]] = [[] for _ in forms]
@@ -210,15 +206,44 @@ class NodalWork:
                 self._r.x.array[: motion.size] = np.where(where, motion, 0.0).ravel()
                 self._r.x.scatter_forward()
                 space.forms.follow(self._r)
+                if self._yields:
+                    strain = space.forms.find_stress_row(self._r.x.array, self._inside.x.array)
+                    rows[0].append(sp.csr_matrix(strain.ravel()))
                 for n, (own, form, away) in enumerate(zip(rows, forms, less, strict=True)):
                     if form is not None:
-                        row = compat.assemble_vector(form).array_r
+                        row = self._find_row(form, damping=n == 1)
                         own.append(sp.csr_matrix(row if away is None else row - away[k]))
                     elif n - len(self._forms) in self._nodal:
                         own.append(sp.csr_matrix(self._r.x.array[: motion.size]))
-        self._count = len(rows[0])
+        self._count = len(rows[2])  # all bodies have a mass
         self._matrices: list[Any] = [sp.vstack(own).tocsr() if own else None for own in rows]
         self._still: dict[int, Array] = {}
+
+    def _check_parts(self, parts: Sequence[Rigid]) -> None:
+        """Raise InputError for parts whose loads or inertia are unknown."""
+        if self._nodal and any(
+            cells is not None or beyond is not None for _, _, cells, beyond in parts
+        ):
+            raise InputError(
+                "section forces: the part of a LinearForm on the cells of a cut is unknown; give "
+                "these loads as Traction and BodyForce, or record Reactions"
+            )
+        if not self.space.forms.densities and any(beyond for *_, beyond in parts):
+            raise InputError(
+                "a section goes through elements, and with forms=… the mass of their parts is "
+                "unknown: let it run along element sides, or give a material for the density in "
+                "place of mass="
+            )
+
+    def _find_row(self, form: Any, *, damping: bool) -> Array:
+        """Return the row (owned nodes d,) of a form on the motion at hand. Collective.
+
+        Where materials yield, damping has the part of the elastic K beside its form.
+        """
+        row = np.array(compat.assemble_vector(form).array_r)
+        if self._yields and damping:
+            row += self.space.forms.find_damping_row(self._r.x.array, self._inside.x.array)
+        return row
 
     def _densities(self) -> list[Any]:
         """Return (density, its load) of the damping and inertia of mass, then of all loads.
@@ -245,6 +270,8 @@ class NodalWork:
         ]
         # gravity g acts on the mass as the acceleration -g
         motion.append(np.zeros_like(motion[0]) - self._gravity)
+        if self._yields:
+            motion[0] = self._find_stress(state)
         return self._sum(motion, lambda function: function(t), state)
 
     def of_step(self, report: Report) -> Array:
@@ -273,7 +300,17 @@ class NodalWork:
             else:
                 motion.append(space.expand(free, t1, k))
         motion[2] = motion[2] + between(problem.ground_acceleration) - self._gravity
+        if self._yields:
+            stress = self._find_stress(report.new)
+            motion[0] = (1.0 - late) * self._find_stress(report.old) + late * stress
         return self._sum(motion, between, balance)
+
+    def _find_stress(self, state: State) -> Array:
+        """Return sigma (points, n) [Pa] of a body that yields in a state. Collective."""
+        u = self._problem.cartesian(state.u)
+        internal: Any = self._problem.system.internal
+        stress: Array = internal.go_on(state.memory, u).stress(u)
+        return stress
 
     def _weigh_end(self, report: Report) -> float:
         """Return w of u = (1 - w) u_old + w u_new in the balance. Collective.
@@ -292,7 +329,7 @@ class NodalWork:
         """Return the works (count,) of all ranks, less contact forces on held nodes. Collective.
 
         Args:
-            motion: nodal u, v, a (owned, d).
+            motion: nodal u, v, a (owned, d); where materials yield sigma (points, n) for u.
             evaluate_at: takes a function of time, and returns its value in the step.
             contact: a state or balance with the contact forces.
         """

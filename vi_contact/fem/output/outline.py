@@ -10,6 +10,7 @@ from ...core.algebra import Array
 from .. import compat
 from ..body.space import FemSpace
 from ..compat import Indices
+from ..contact.present import find_present
 from ..mesh.tagged_mesh import Facets
 
 
@@ -56,6 +57,8 @@ def outline(
 ) -> list[dict[str, Any]]:
     """Return the lines that draw a body, the same on any number of ranks. Collective.
 
+    What is absent is not drawn.
+
     In the plane these are the facets of the boundary and of its groups, and the borders of each
     region; in space and on a line the edges of a box round each region.
 
@@ -78,7 +81,8 @@ def outline(
     drawn = []
     for group in groups:
         # each facet is drawn by its owner, with the end of least coordinates first
-        own = group.indices[group.indices < mesh.topology.index_map(1).size_local]
+        present = group.indices[find_present(space, group)]
+        own = present[present < mesh.topology.index_map(1).size_local]
         corners = mesh.geometry.x[compat.entities_to_geometry(mesh, 1, own)][..., :2].tolist()
         lines = []
         for ends in corners:

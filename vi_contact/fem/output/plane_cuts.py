@@ -101,6 +101,7 @@ def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tup
     vertices = x[:, : len(compat.sub_entities(mesh, 0))]
     trace = _Trace((vertices - corners[0]) @ axes[1:].T, level(vertices), size, tol)
     inside &= trace.touches
+    inside = _keep_present(space, name, inside)
     left, right, through = _measure_cover(space, name, trace, inside, size)
 
     # nodes that move: on the cut, and with cells of first order all behind it, so that a cell which
@@ -125,6 +126,28 @@ def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tup
     holding = inside & (trace.left if sign > 0.0 else trace.right)
     turns = axes if len(axes) == 3 else 1.0
     return (nodes[:, None], middle, holding, beyond), -sign * block_diag(axes, turns)
+
+
+def _keep_present(space: FemSpace, name: str, inside: Mask) -> Mask:
+    """Return which cells of a cut are there. Collective.
+
+    Args:
+        space: the body's unknowns.
+        name: that of the cut.
+        inside: (local cells,) of the group with a point of the cut.
+
+    Raises:
+        InputError: on all ranks, a cut through absent bodies alone.
+    """
+    if space.absent is None:
+        return inside
+    there = inside & ~space.absent
+    drawn, present = space.comm.max(np.array([inside.any(), there.any()], dtype=float))
+    if drawn and not present:
+        raise InputError(
+            f"section '{name}' cuts bodies that are absent: record it in stages that have them"
+        )
+    return there
 
 
 def _measure_cover(

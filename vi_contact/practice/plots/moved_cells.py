@@ -39,6 +39,8 @@ def draw_moved_cells(limit: LimitLoad, size: float) -> Any:
     d = limit.problem.cartesian(limit.mechanism.u)
     shift = space.expand(d, 0.0) - space.expand(np.zeros_like(d), 0.0)
     cells = compat.cell_blocks(space.V)
+    if space.absent is not None:
+        cells = cells[~space.absent]
     corners = cells[:, _find_corners(cells.shape[1])]
     polygons = space.points[corners]
     whole = float(np.ptp(space.points, axis=0).max())

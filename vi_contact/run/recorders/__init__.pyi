@@ -6,6 +6,7 @@ from .largest_strain import LargestStrain as LargestStrain
 from .probe import Probe as Probe
 from .racking import Racking as Racking
 from .reactions import Reactions as Reactions
+from .reservoir_water import ReservoirWater as ReservoirWater
 from .resultants import Resultants as Resultants
 from .section_forces import SectionForces as SectionForces
 from .stress_strain import StressStrain as StressStrain

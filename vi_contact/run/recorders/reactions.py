@@ -29,6 +29,9 @@ class Reactions:
 
         R = (K u + C v + M (a + r a_g) - f)_c
 
+    Where materials yield, the force of their stresses at points of integration is in the place of K
+    u, and C is of the elastic K.
+
     On held components they are rows of the equation of motion that the elimination of prescribed
     displacements took out, less contact forces (on a prescribed side 2 of a pair and on edges of P2
     tetrahedra); at nodes with dashpots what these and the waves that come in (CompliantBase,

@@ -169,12 +169,18 @@ class Resultants:
         remedy = "use one of fem.assemble"
         provides(owner, "the system's space", space, ("facet_blocks",), remedy)
         nodes = from_each(comm, space.nodes[space.facet_blocks(self.part.indices)])
-        chosen = np.isin(whole.nodes, np.concatenate(nodes))  # type: ignore[arg-type]
+        conditions = np.zeros(0, dtype=np.int64) if whole.nodes is None else whole.nodes
+        chosen = np.isin(conditions, np.concatenate(nodes))
+        if not chosen.any() and getattr(space, "absent", None) is not None:
+            raise InputError(
+                f"{owner}: nothing is in contact there while bodies are absent: record it in "
+                "stages that have both sides, by record tables of their own"
+            )
 
         # A group that only touches the contact at an edge is a mistake: it has to have a facet all
         # of whose corners are contact nodes, or clamped ones.
         clamped = from_each(comm, space.nodes[space.held.all(axis=1)])
-        contact = np.concatenate([whole.nodes, *clamped])
+        contact = np.concatenate([conditions, *clamped])
         touching = np.isin(space.corners_of_facets(self.part.indices), contact)
         if not largest(comm, touching.all(axis=1).any()):
             raise InputError(

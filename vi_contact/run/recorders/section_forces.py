@@ -71,10 +71,11 @@ class SectionForces:
     minus the sum of the nodal forces K u + C v + M a - f (a absolute) of the cells on the cut at
     their nodes on one side, without inertia and loads of the parts of cells on this side: not
     integrated stresses, but the forces by which these elements are in equilibrium, exact on any
-    mesh for what acts on them. Contact forces act at nodes; those on nodes of the cut itself, of P2
-    tetrahedra on held ones too, belong to neither side and are left out. Values are those of the
-    step's equation of motion, row 0 those of the initial state at rest; per thickness of the
-    section (plane strain: per metre).
+    mesh for what acts on them. Where materials yield, the forces of their stresses at points of
+    integration are in the place of K u. Contact forces act at nodes; those on nodes of the cut
+    itself, of P2 tetrahedra on held ones too, belong to neither side and are left out. Values are
+    those of the step's equation of motion, row 0 those of the initial state at rest; per thickness
+    of the section (plane strain: per metre).
 
     Args:
         cells: the group that is cut, the whole mesh when None: a cut of a wall with soil on both
@@ -84,7 +85,7 @@ class SectionForces:
 
     Raises:
         InputError: a cut that leaves the group (in space: misses it) or ends inside it, or goes
-            through cells of degree 2; corners of no rectangle.
+            through cells of degree 2; a cut through absent bodies alone; corners of no rectangle.
     """
 
     cuts: Annotated[Mapping[str, Sequence[Sequence[float]]], Unit("m")]

@@ -13,6 +13,7 @@ The spring unknowns of a rank follow its body unknowns. Contact arrays (m,) are 
 that this rank owns.
 """
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -63,7 +64,7 @@ class BoundedSystem:
     def comm(self) -> Any:
         """Return the PETSc communicator."""
         matrix: Any = self.A.matrix
-        return PETSc.COMM_SELF if isinstance(matrix, SerialMatrix) else matrix.mat.comm
+        return own_communicator() if isinstance(matrix, SerialMatrix) else matrix.mat.comm
 
     def max(self, *values: float) -> Array:
         """Return the maxima over the ranks."""
@@ -152,11 +153,21 @@ class BoundedSystem:
         return make_aij(rows, self.comm)
 
 
+@cache
+def own_communicator() -> Any:
+    """Return a communicator of this rank alone, for matrices that no mesh has brought.
+
+    It is a copy of PETSc's COMM_SELF. What waits there is freed by PETSc's end, after the end of
+    Python, where solvers with contexts in Python would crash.
+    """
+    return PETSc.COMM_SELF.tompi4py().Dup()
+
+
 def convert_to_aij(A: EffectiveMatrix) -> Any:
     """Return A as PETSc's AIJ matrix, its own where it has one."""
     matrix = A.matrix
     if isinstance(matrix, SerialMatrix):
-        return make_aij(matrix.csr, PETSc.COMM_SELF)
+        return make_aij(matrix.csr, own_communicator())
     return matrix.mat  # type: ignore[attr-defined]
 
 

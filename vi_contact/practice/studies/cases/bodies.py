@@ -31,6 +31,7 @@ BODY_TABLES = ("beam", "particle")  # each is a body and its contact
 TABLES_OF_MESHES = (
     "material",
     "system",
+    "reservoir",
     "contact",
     "gravity",
     "mass",

@@ -6,6 +6,7 @@ interface.
 [mesh]            fem.build_mesh, fem.read_mesh        [scheme] [solver] [[escalation]]
 [material.NAME]   LinearElastic, Orthotropic, MohrCoulomb, … [[record]] [fields]
 [system]          fem.assemble                         [run]      the other arguments of simulate
+[reservoir]       fem.Reservoir, of fem.assemble
 [[contact]]       fem.contact_surface, .contact_pair   [gravity]  with_weight, static_equilibrium
 [friction] [impact] [mass] [[excitation]]              [[check]]  to compare with engineering.checks
 [[stage]]  what replaces these tables in stages that follow one another
@@ -34,6 +35,7 @@ from ....core.step import Recorder, Scheme, Solver, State
 from ....core.surfaces import ContactSurface, empty_surface
 from ....fem.body.assembly import assemble
 from ....fem.body.heterogeneous import Heterogeneous
+from ....fem.body.reservoir import Reservoir
 from ....fem.contact.joined import joined_surfaces
 from ....fem.mesh.communicators import MpiComm
 from ....fem.mesh.tagged_mesh import Tags, build_mesh, read_mesh
@@ -75,6 +77,7 @@ from .stage_tables import Stage, split_stages
 from .stages import Reached, run_stages
 from .strain_compatible import CALL, iterate, with_known_damping
 from .table_calls import (
+    SUPPLIED,
     Call,
     Callee,
     Group,
@@ -100,7 +103,10 @@ TABLES: dict[str, Any] = {
     "beam": BeamBody,
     "particle": ParticleBody,
     "material": Mapping[str, LinearElastic | Orthotropic | Heterogeneous | YieldingMaterial],
-    "system": make_callee(assemble, keys={"clamped": "fixed"}),
+    "system": make_callee(
+        assemble, keys={"clamped": "fixed"}, supplied=(*SUPPLIED, "reservoir")
+    ),
+    "reservoir": make_callee(Reservoir),
     "strain_compatible": CALL,
     "contact": ContactSurface | Sequence[ContactSurface],
     "layer": LayerLaw,
@@ -166,7 +172,7 @@ class Case:
         """
         for stage in self.stages[:-1]:
             stage.case.check()
-        need_mesh = ("title", "mesh", "system", "contact", "gravity")
+        need_mesh = ("title", "mesh", "system", "reservoir", "contact", "gravity")
         for table, node in self.nodes.items():
             if table not in need_mesh and not needs_body(node):
                 self._build_table(table)
@@ -522,6 +528,7 @@ class Case:
         call = self.nodes["system"]
         if "strain_compatible" in self.nodes:
             call = with_known_damping(call)
+        context["reservoir"] = self._build_table("reservoir", **context)
         system = build(call, context)
         if "gravity" in self.nodes:
             system = self._build_table("gravity", system=system, tags=tags)
@@ -709,6 +716,7 @@ def _read_node(name: str, tables: Mapping[str, Any], spot: Spot, words: Words) -
         if not isinstance(value, dict):
             raise spot.make_error("is not a table: write its keys below it")
         if name == "system":
+            _refuse_reservoir(value, spot)
             value = _add_materials(value, tables.get("material", {}))
         return read_arguments(value, hint, spot, words)
     if name == "material" and isinstance(value, dict) and not _holds_tables(value):
@@ -722,6 +730,14 @@ def _read_node(name: str, tables: Mapping[str, Any], spot: Spot, words: Words) -
     if name == "material" and isinstance(node, dict):
         words.named[LinearElastic] = node  # before the system names them
     return node
+
+
+def _refuse_reservoir(system: Mapping[str, Any], spot: Spot) -> None:
+    """Raise InputError for a reservoir in [system], which has a table of its own."""
+    if "reservoir" in system:
+        raise spot.make_table_error(
+            "has the key 'reservoir', which is a table of its own: write [reservoir] with its keys"
+        )
 
 
 def _holds_tables(table: Mapping[str, Any]) -> bool:

@@ -81,11 +81,13 @@ def _describe_stage(tables: Mapping[str, Any]) -> dict[str, Any]:
     keys = {"name": _PLAIN[str], "type": kind, "release": _PLAIN[bool]}
     keys |= {"add": names, "remove": names}
     parts = {key: tables[key] | {"required": []} for key in BY_KEY}
+    wholes = {key: tables[key] for key in WHOLE}
+    wholes["reservoir"] = wholes["reservoir"] | {"required": []}  # empty: there is no water
     return {
         "type": "object",
         "additionalProperties": False,
         "required": ["name", "type"],
-        "properties": keys | parts | {key: tables[key] for key in WHOLE},
+        "properties": keys | parts | wholes,
     }
 
 

@@ -17,6 +17,7 @@ from .parsing import suggest_nearest
 BY_KEY = ("system", "run")
 WHOLE = (
     "gravity",
+    "reservoir",
     "contact",
     "friction",
     "impact",
@@ -123,6 +124,8 @@ def _read_stage(label: str, own: Mapping[str, Any], tables: Mapping[str, Any]) -
         run = whole.get("run", {})
         whole["run"] = {key: run[key] for key in run if key in ("tolerance", "out")} | AT_REST
     whole |= {key: own[key] for key in WHOLE if key in own}
+    if whole.get("reservoir") == {}:  # a stage whose reservoir is empty
+        del whole["reservoir"]
     return Stage(f"{label} '{name}'", name, kind == "static", release, whole)
 
 

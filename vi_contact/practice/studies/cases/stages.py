@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ....core.algebra import Array
-from ....core.errors import InputError
+from ....core.errors import InputError, StepFailure
 from ....core.files import on_root, write_atomically
 from ....core.internal import remembers
 from ....core.own_files import inner_folder, is_own, make_inner_folder, read_text
@@ -258,12 +258,15 @@ def _run_stage(
     restart = options.get("restart")
     if stage.static and restart:  # it has been solved
         state = initial_state(stage.case.problem(comm, parts))
-    with stage.case.call(parts, folder, state) as call:
-        stage.case.keep_model(comm, parts, folder)
-        arguments = call | options
-        if restart:
-            arguments["state"] = None  # the checkpoint has it
-        solution = simulate(**arguments)
+    try:
+        with stage.case.call(parts, folder, state) as call:
+            stage.case.keep_model(comm, parts, folder)
+            arguments = call | options
+            if restart:
+                arguments["state"] = None  # the checkpoint has it
+            solution = simulate(**arguments)
+    except StepFailure as error:
+        raise StepFailure(f"{stage.label}: {error}") from error
     earlier = reached.earlier
     if stage.changes:  # it is in equilibrium on its own supports alone
         earlier = ()

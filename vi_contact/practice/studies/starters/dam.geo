@@ -48,6 +48,7 @@ Physical Surface("dam") = {1};
 Physical Surface("rock") = {2};
 Physical Curve("dam_base") = {1};
 Physical Curve("upstream_face") = {5};       // its wet part
+Physical Curve("downstream_face") = {2};
 Physical Curve("rock_joint") = {11};
 Physical Curve("reservoir_floor") = {16};
 Physical Curve("rock_bottom") = {14};

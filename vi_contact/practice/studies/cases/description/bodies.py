@@ -13,6 +13,8 @@ from .....fem.mesh.tagged_mesh import Cells
 from .....fem.output.outline import longest_edge, outline
 from .....fem.output.sizes import measure_cells
 from .....laws.iwan import Iwan
+from .....laws.materials import LinearElastic
+from .....laws.yielding import YieldingMaterial
 from .conditions import describe_supports
 
 # Of first order in a wave length: Kuhlemeyer and Lysmer (1973); the cautious take 10.
@@ -118,7 +120,7 @@ def _describe_body(
         "size": total(space.comm, sizes[owned].sum()),
         "centre": (first / mass).tolist(),
         "box": find_box(space.comm, points),
-        "material": {"type": type(material).__name__} | numbers,
+        "material": {"type": _name_law(material)} | numbers,
         "shear_modulus": _find_range(space.comm, shear / thickness),
         "density": _find_range(space.comm, density / thickness),
         "alpha": _find_range(space.comm, inertial / density),
@@ -151,3 +153,9 @@ def _find_range(comm: Any, values: Array) -> list[float]:
     """Return the least and the largest of values of all ranks. Collective."""
     low = -largest(comm, np.max(-values, initial=-np.inf))
     return [low, largest(comm, np.max(values, initial=-np.inf))]
+
+
+def _name_law(material: Any) -> str:
+    """Return the name of a law; that of a linear body which only remembers its stress is linear."""
+    kind = LinearElastic if type(material) is YieldingMaterial else type(material)
+    return kind.__name__

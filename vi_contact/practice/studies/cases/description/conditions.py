@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -9,13 +10,17 @@ import numpy as np
 
 from .....core.algebra import Array, largest
 from .....core.problem import ContactProblem
+from .....core.state_checks import initial_state
 from .....core.step import AXES
+from .....core.surfaces import ContactSurface
 from .....fem.body.absent import NAME as ABSENT
+from .....fem.body.placing import adds_or_removes
 from .....fem.mesh.tagged_mesh import Facets
 from .....fem.output.outline import facets_with_cells
 from ..bodies import Body
 from ..friction_of_tables import count_points, find_mu
 from ..table_calls import Group, build, walk_nodes
+from .water_and_joints import describe_values
 
 _CAPITAL = re.compile(r"(?<=[a-z])(?=[A-Z])")  # between the words of a name such as CompliantBase
 
@@ -65,7 +70,7 @@ def describe_contact(
     nodes = tables if isinstance(tables, tuple) else (tables,)
 
     # The points of the whole surface, on all ranks, are those of one table after the other.
-    whole = surface.whole()
+    whole = _stand(problem).whole()
     ends = np.cumsum([0, *count_points(surface, joints)])
     firsts = np.cumsum([0, *joints])
     laws = case.list_friction()
@@ -82,12 +87,25 @@ def describe_contact(
             "gaps": _find_gaps(whole.gap0[a:b]),
             "held": bool(node.arguments.get("roller", False)),
             "friction": repr(law),
+            "joint": [] if joint is None else list(describe_values(law)),
             "mu": find_mu(law),
             "nodes": "" if census is None else census.in_words(),
             "places": whole.points[a:b],
             "others": {} if census is None else census.places,
             "sides": _describe_sides(problem.system.space, tags, groups, whole.points[a:b]),
         }
+
+
+def _stand(problem: ContactProblem) -> ContactSurface:
+    """Return the surface with its gaps at the start, where bodies have been placed on others.
+
+    What is placed touches whatever has moved below it, so that gaps as drawn say nothing there.
+    """
+    surface = problem.surface
+    if not adds_or_removes(problem):
+        return surface
+    moved = surface.normal_values(initial_state(problem).u)
+    return replace(surface, gap0=surface.gap0 - moved)
 
 
 def _find_gaps(gaps: Array) -> list[float]:

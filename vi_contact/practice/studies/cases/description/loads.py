@@ -58,6 +58,8 @@ def describe_loads(
     for given in node if isinstance(node, tuple) else (node,):
         load = build(given, {"tags": tags})
         loads.append(_describe_load(given, load, problem, t_end))
+    if "reservoir" in case.nodes:
+        loads += _describe_reservoir(case.nodes["reservoir"], tags, problem, t_end)
     return [_round(load, size) for load in loads]
 
 
@@ -190,6 +192,25 @@ def _describe_load(given: Any, load: Any, problem: ContactProblem, t_end: float)
         "point": None if resultant.point is None else resultant.point.tolist(),
         "varies": _describe_change(given, load, t_end),
     }
+
+
+def _describe_reservoir(
+    node: Call, tags: Mapping[str, Any], problem: ContactProblem, t_end: float
+) -> list[dict[str, Any]]:
+    """Return the pressures of a reservoir at rest with their resultants; collective.
+
+    Args:
+        node: of [reservoir].
+        tags: groups of the mesh.
+        problem: on which they act.
+        t_end: when the run ends [s].
+    """
+    reservoir = build(node, {"tags": tags})
+    loads = []
+    for name, load in zip(reservoir.name_loads(), reservoir.make_loads(), strict=True):
+        described = _describe_load((), load, problem, t_end)
+        loads.append(described | {"name": name, "groups": [load.facets.name]})
+    return loads
 
 
 def _describe_change(given: Any, load: Any, t_end: float) -> str:

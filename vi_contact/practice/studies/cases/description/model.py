@@ -31,6 +31,7 @@ from .motions import (
     list_motions,
 )
 from .surroundings import describe_sides
+from .water_and_joints import describe_reservoir
 
 # unknowns: up to so many a run tells its periods, which take two seconds; more when it is checked
 FEW = 10_000
@@ -80,6 +81,7 @@ def describe(
         "run": run,
         "method": case.describe_method(problem),
         "outline": body["outline"],
+        "reservoir": describe_reservoir(case, tags),
     }
     model |= _describe_contact(case, problem, tags, parts.tables)
     model |= _describe_actions(case, problem, tags, run["t_end"])

@@ -5,6 +5,7 @@ from typing import Any
 
 from ....units.report_units import write_number
 from .pen import NONE, Model, Pen, Row, clip, list_objects, say
+from .water_and_joints import list_joint
 
 
 def list_loads(model: Model, pen: Pen) -> Iterator[Row]:
@@ -49,7 +50,9 @@ def list_contact(model: Model, pen: Pen) -> Iterator[Row]:
     """Yield the parts of the contact: area, friction, gap and what became of their nodes."""
     for part in list_objects(model, "contact"):
         name = part.get("name", NONE)
-        if "friction" in part:
+        if part.get("joint"):
+            yield from list_joint(part, pen)
+        elif "friction" in part:
             yield _write_friction(name, part["friction"])
         if "size" in part:
             area = "held together" if part.get("held") else ""

@@ -13,12 +13,14 @@ from .rows_of_actions import list_contact, list_loads, list_supports
 from .rows_of_bodies import list_bodies, list_model
 from .rows_of_motions import list_motions, list_spectra
 from .rows_of_steps import list_damping, list_sides, list_steps
+from .water_and_joints import list_reservoir
 
 HEADER = ("quantity", "value", "unit", "remark")
 # Title of a table -> its rows.
 TABLES: Mapping[str, Callable[[Model, Pen], Iterator[Row]]] = {
     "model": list_model,
     "bodies and materials": list_bodies,
+    "reservoir": list_reservoir,
     "loads": list_loads,
     "supports": list_supports,
     "contact": list_contact,

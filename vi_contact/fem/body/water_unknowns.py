@@ -1,0 +1,169 @@
+"""Give a body the unknowns of compressible water (``acoustic_water``), beside those of its nodes.
+
+They are the last ones of the last rank, and no displacements of points: no translation moves them,
+and outputs of the body do not see them.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from ...core.algebra import Array, Indices, Mask
+from ..matrices.petsc_algebra import PetscAlgebra, PetscMatrix
+from ..matrices.petsc_rows import aij_of, rows_of
+from .acoustic_water import WaterData, WaterEquations, find_water
+from .space import FemSpace
+from .wet_face import WetFace
+
+
+class AcousticWater:
+    """Hold the water of a body: its equations, its face and its place among the unknowns.
+
+    Attributes:
+        equations: those of the water, the same on every rank.
+        face: the wet face.
+        data: which water it is.
+        here: whether this rank owns the unknowns.
+    """
+
+    def __init__(self, space: FemSpace, face: WetFace, data: WaterData) -> None:
+        """Find the equations, and add the unknowns to those of the body. Collective.
+
+        Args:
+            space: the body's unknowns.
+            face: its wet face.
+            data: of the water.
+        """
+        self.face = face
+        self.data = data
+        self._space = space
+        # found once: no rank may see other modes
+        own = find_water(face.x, face.y, face.side, data) if space.comm.rank == 0 else None
+        self.equations: WaterEquations = space.comm.bcast(own)
+        self.here = space.comm.rank == space.comm.size - 1
+        self._start = space.unknowns
+        body = self._find_body()
+        space.add_unknowns(self.equations.count if self.here else 0, face.points[0], body)
+
+    def _find_body(self) -> int:
+        """Return the body that has the face. Collective."""
+        space = self._space
+        at = (self.face.touched - self.face.first) // space.dimension
+        at = at[(at >= 0) & (at < len(space.nodes))]
+        found = np.max(space.body_of_node[at], initial=-1)
+        return int(space.comm.max(np.array([found], dtype=float))[0])
+
+    def mass_of_face(self) -> Any:
+        """Return rho S Kp⁻¹ Sᵀ on all components (PETSc). Collective."""
+        form = np.zeros((self.face.nodes, self.face.nodes))
+        form[np.ix_(self.face.below, self.face.below)] = self.equations.of_face
+        return self.face.spread(self._space, form)
+
+    def find_volumes(self, nodal: Array) -> Array:
+        """Return Sᵀ of a motion (owned nodes, d): volumes of the nodes below the level. Collective.
+
+        The unit is m³ of displacements, and the like of their rates.
+        """
+        volumes: Array = self._space.comm.sum(np.asarray(self.face.own.T @ nodal.ravel()))
+        return volumes[self.face.below]
+
+    @property
+    def outlets(self) -> Mask | None:
+        """Return which unknowns (n,) are outlets, None where nothing flows out."""
+        damping = self.equations.damping
+        return self.put(damping) > 0.0 if damping.any() else None
+
+    def own_values(self, x: Array) -> Array:
+        """Return the values (w,) of the water in a vector (n,), on every rank. Collective."""
+        count = self.equations.count
+        mine = x[len(x) - count :] if self.here else np.zeros(count)
+        return self._space.comm.sum(mine)
+
+    def find_force(self, pressure: Array) -> Array:
+        """Return the force (d,) [N] of pressures (b,) [Pa] of nodes below the level on the body."""
+        nodal = self.face.S[:, self.face.below] @ pressure
+        # rows of all components begin with a node, and n of S points into the water
+        component = self.face.touched % self._space.dimension
+        return np.array([-nodal[component == c].sum() for c in range(self._space.dimension)])
+
+    def put(self, values: Array) -> Array:
+        """Return a vector (n,) with these values (w,) of the water, and zero elsewhere."""
+        vector = np.zeros(len(self._space.ids))
+        if self.here:
+            vector[len(vector) - len(values) :] = values
+        return vector
+
+    def add_momenta(self, momenta: Array) -> None:
+        """Add what horizontal unit accelerations of all nodes pull on the water. Collective."""
+        for column in range(self._space.dimension - 1):  # the last axis points up
+            volumes = self.find_volumes(self._space.translations[column])
+            momenta[:, column] += self.put(self.equations.coupling.T @ volumes)
+
+    def make_load(self) -> Callable[[float], Array]:
+        """Return t [s] -> what accelerated held nodes do on the water (n,) [N]."""
+
+        def load(t: float) -> Array:
+            volumes = self.find_volumes(self._space.evaluate_prescribed(t, 2))
+            return self.put(-self.equations.coupling.T @ volumes)
+
+        return load
+
+    def join(self, name: str, matrix: PetscMatrix | None, algebra: PetscAlgebra) -> Any:
+        """Return M, C or K of body and water; None for a C without any damping. Collective.
+
+        Args:
+            name: "M", "C" or "K".
+            matrix: that of the body, None where it has none.
+            algebra: how the matrix is stored.
+        """
+        equations = self.equations
+        if name == "M":
+            entries = self._couple() + self._stand_alone(equations.mass)
+        else:
+            diagonal = equations.damping if name == "C" else equations.stiffness
+            if matrix is None and not diagonal.any():
+                return None
+            entries = self._stand_alone(np.diag(diagonal))
+        if matrix is not None:
+            body = rows_of(matrix.mat)
+            body.resize(entries.shape)
+            entries = entries + body
+        return algebra.store(aij_of(entries, algebra.comm.mpi, entries.shape[0]))
+
+    def _stand_alone(self, block: Array) -> sp.csr_matrix:
+        """Return the owned rows of a matrix with a block (w, w) of the water."""
+        row, column = np.nonzero(block) if self.here else (np.zeros(0, int), np.zeros(0, int))
+        start = len(self._space.ids) - self.equations.count
+        return self._rows(start + row, self._start + column, block[row, column])
+
+    def _couple(self) -> sp.csr_matrix:
+        """Return the owned rows of the coupling of face and water, both ways. Collective."""
+        space = self._space
+        face = self.face
+        coupling = face.S[:, face.below] @ self.equations.coupling
+
+        # unknowns of the touched components over all ranks, -1 where they are held
+        place = face.touched - face.first
+        mine = np.flatnonzero((place >= 0) & (place < face.own.shape[0]))
+        unknown = np.zeros(len(face.touched))
+        unknown[mine] = space.numbers.ravel()[place[mine]]
+        numbers = np.rint(space.comm.sum(unknown)).astype(np.int64)
+        local = mine[numbers[mine] >= 0]
+        w = self.equations.count
+        rows = np.repeat(space.free_index[place[local]], w)
+        columns = np.tile(self._start + np.arange(w), len(local))
+        entries = self._rows(rows, columns, coupling[local].ravel())
+        if not self.here:
+            return entries
+        moves = np.flatnonzero(numbers >= 0)
+        below = len(space.ids) - w + np.arange(w)
+        rows = np.repeat(below, len(moves))
+        columns = np.tile(numbers[moves], w)
+        return entries + self._rows(rows, columns, coupling[moves].T.ravel())
+
+    def _rows(self, rows: Indices, columns: Indices, values: Array) -> sp.csr_matrix:
+        """Return owned rows with these entries."""
+        shape = (len(self._space.ids), self._start + self.equations.count)
+        return sp.csr_matrix((values, (rows, columns)), shape=shape)
