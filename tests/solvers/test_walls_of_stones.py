@@ -15,9 +15,11 @@ from mpi4py import MPI
 import vi_contact as vc
 from vi_contact import fem
 from vi_contact.kernels.bodies import CondensedBodies
+from vi_contact.kernels.dissection import dissect
+from vi_contact.kernels.fronts import Fronts
 from vi_contact.meshes.masonry import MasonryMesh
 from vi_contact.solvers import condensed
-from vi_contact.solvers.friction.kept_factor import KeptFactor
+from vi_contact.solvers.friction.kept_factor import Jacobian, KeptFactor
 
 STONE = vc.LinearElastic(E=1e10, nu=0.2, rho=2400.0)
 
@@ -113,16 +115,75 @@ def test_a_joint_takes_the_same_wall(monkeypatch: Any) -> None:
     assert max(report.certificate.worst for report in reports) < 1e-9
 
 
+class Factor:
+    """A factor of a whole R G + D, in the place of fronts."""
+
+    def __init__(self, G: Any) -> None:
+        self._G = G.toarray()
+
+    def factorise(self, R: Any, D: Any) -> bool:
+        self._J = R.ravel()[:, None] * self._G + np.diag(D.ravel())
+        return True
+
+    def solve(self, v: Any) -> Any:
+        return np.linalg.solve(self._J, v)
+
+
+def make_jacobian(G: Any, marks: Any) -> Jacobian:
+    """Rows of G where a mark is one, and of the identity elsewhere."""
+    return Jacobian(G, marks[:, :, None], 1.0 - marks[:, :, None])
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("d", [2, 3])
+def test_fronts_give_what_one_matrix_gives(d: int) -> None:
+    """Bodies in a random order in rows, some conditions open and some that slip, a condition of
+    three bodies and one of a single one: the residual of J x = v is rounding."""
+    rng = np.random.default_rng(d)
+    side = 9
+    place = rng.permutation(side * side).reshape(side, side)
+    pairs = [[place[i, j], place[i, j + 1]] for i in range(side) for j in range(side - 1)]
+    pairs += [[place[i, j], place[i + 1, j]] for i in range(side - 1) for j in range(side)]
+    pairs = [pair for pair in pairs for _ in range(3)]
+    pairs += [[place[0, 0]], [place[3, 3], place[3, 4], place[4, 3]]]
+    m = len(pairs)
+    rows = np.repeat(np.arange(m), [len(pair) for pair in pairs])
+    bodies = np.concatenate(pairs)
+    touched = sp.csr_matrix((np.ones(len(rows)), (rows, bodies)))
+    middle = np.array([np.argwhere(place == k)[0] for k in range(side * side)], dtype=float)
+    points = np.array([middle[pair].mean(axis=0) for pair in pairs])
+    B = sp.kron(touched, np.ones((d, 4))).tocsr()
+    B.data = rng.normal(size=B.nnz)
+    G = sp.csr_matrix(B @ B.T + sp.identity(m * d))
+    fronts = Fronts(G, dissect(touched, points), d)
+    R = np.tile(np.eye(d), (m, 1, 1))
+    D = np.zeros((m, d, d))
+    is_open = rng.random(m) < 0.2
+    slips = ~is_open & (rng.random(m) < 0.2)
+    R[is_open] = 0.0
+    D[is_open] = np.eye(d)
+    R[slips, 1:] = 0.0
+    D[slips, 1, 0] = -0.5
+    D[slips, 1:, 1:] = np.eye(d - 1)
+    assert fronts.factorise(R, D)
+    v = rng.normal(size=m * d)
+    x = fronts.solve(v)
+    assert np.abs(Jacobian(G, R, D) @ x - v).max() < 1e-10 * np.abs(x).max()
+    # a singular one is said to be so
+    R[:] = 0.0
+    D[:] = 0.0
+    assert not fronts.factorise(R, D)
+
+
 @pytest.mark.serial
 def test_iterations_follow_the_rows_that_changed() -> None:
     """k changed rows: at most k + 1 iterations, and the answer of a factor of its own."""
     rng = np.random.default_rng(3)
     n = 200
     J = sp.csr_matrix(np.eye(n) * 4.0 + np.diag(np.ones(n - 1), 1) + np.diag(np.ones(n - 1), -1))
-    free = np.ones(n, dtype=bool)
     marks = np.ones((n, 1))
-    kept = KeptFactor()
-    kept.solve(J, free, rng.normal(size=n), marks)
+    kept = KeptFactor(Factor(J))
+    kept.solve(make_jacobian(J, marks), rng.normal(size=n), marks)
     for k in (1, 5, 12):
         changed = J.tolil()
         rows = rng.choice(n, k, replace=False)
@@ -133,7 +194,7 @@ def test_iterations_follow_the_rows_that_changed() -> None:
         states[rows] = 0.0
         right = rng.normal(size=n)
         before = kept.iterations
-        x = kept.solve(sp.csr_matrix(changed), free, right, states)
+        x = kept.solve(make_jacobian(J, states), right, states)
         assert x is not None and kept.factors == 1
         assert kept.iterations - before <= k + 1
         assert np.abs(changed @ x - right).max() < 1e-8 * np.abs(right).max()

@@ -96,6 +96,16 @@ class Bodies:
             x[shape.unknowns] = shape.lu.solve(np.ascontiguousarray(b[shape.unknowns].T)).T
         return x
 
+    def number_unknowns(self) -> Indices:
+        """Return the number of the body of each unknown (rows,)."""
+        numbers = np.empty(self.rows, dtype=np.int64)
+        count = 0
+        for shape in self.shapes:
+            for unknowns in shape.unknowns:
+                numbers[unknowns] = count
+                count += 1
+        return numbers
+
     def respond(self, force: Array) -> Array:
         """Return A⁻¹ force (rows,) of forces (rows,) on unknowns that contact reads."""
         x = np.empty(self.rows)
@@ -241,6 +251,14 @@ class CondensedBodies:
         entries = (values, (rows, rows))
         shape = self.flexibility.shape
         self.flexibility = sp.csr_matrix(self.flexibility + sp.coo_matrix(entries, shape=shape))
+
+    def find_touched(self) -> sp.csr_matrix:
+        """Return which bodies each condition reads, (m, bodies), not zero where it does."""
+        width = 1 + self._traces.width
+        entries = sp.coo_matrix(self._traces.every)
+        bodies = self.bodies.number_unknowns()[self._traces.unknowns[entries.col]]
+        shape = (entries.shape[0] // width, int(bodies.max(initial=-1)) + 1)
+        return sp.csr_matrix((np.ones(entries.nnz), (entries.row // width, bodies)), shape=shape)
 
     def find_free_motion(self, b: Array) -> Array:
         """Return B A⁻¹b, and keep A⁻¹b for ``answer``. Collective."""

@@ -25,6 +25,7 @@ from ...core.collective import ask_limit, ask_slope
 from ...core.errors import ViContactError
 from ...core.step import Answers, StepProblem, StepResult
 from ...core.surfaces import ContactSurface
+from ...kernels.bodies import CondensedBodies
 from ...kernels.condensation import Condensation
 from .hyperstatic import Hyperstatic
 from .problem import FrictionMethod, FrictionResult
@@ -95,7 +96,15 @@ class CondensedFriction:
                 rings=find_rings(B, condensed.movable, d),
                 weights=surface.everywhere(surface.weights),
                 movable=condensed.movable,
+                touched=self._find_touched(),
+                points=surface.everywhere(surface.points),
             )
+
+    def _find_touched(self) -> sp.csr_matrix | None:
+        """Return which bodies conditions read, (m, bodies), where they are condensed by bodies."""
+        if isinstance(self.condensed, CondensedBodies):
+            return self.condensed.find_touched()
+        return None
 
     def solve(self, step: StepProblem, rigid: Mask) -> StepResult:
         """Return the answer to a step; ``rigid`` (m,) says which supports are. Collective."""

@@ -49,6 +49,8 @@ class Hyperstatic:
         rings: list[Ring],
         weights: Array,
         movable: Mask,
+        touched: sp.csr_matrix | None = None,
+        points: Array | None = None,
     ) -> None:
         """Prepare the method for G, shifted where traces depend on one another.
 
@@ -59,6 +61,8 @@ class Hyperstatic:
             rings: groups whose traces depend on one another.
             weights: (m,) lengths or areas.
             movable: (m d,) which tangents are not prescribed, True for normals.
+            touched: (m, bodies) which bodies conditions read, with a sparse G.
+            points: (m, dimension) where conditions are, with a sparse G [m].
         """
         self._method = method
         self._rings = rings
@@ -68,7 +72,11 @@ class Hyperstatic:
         self._is_sparse = sp.issparse(G)
         if self._is_sparse:
             self._delassus: ScaledDelassus = SparseDelassus(G, bilateral)
-            self._small: Any = SparseNewton(method, G, self._make_sparse_shift(G), bilateral)
+            assert touched is not None and points is not None
+            shift = self._make_sparse_shift(G)
+            self._small: Any = SparseNewton(
+                method, G, shift, bilateral, touched=touched, points=points
+            )
             return
         self._delassus = ScaledDelassus(G, bilateral, unsymmetric=True)
         self._strength = 0.0

@@ -6,14 +6,14 @@ and columns of the conditions whose state has changed, and GMRES with the kept f
 k + 1 iterations, and none changed costs one. Where that takes too many the factor is made anew.
 """
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import solve_triangular
-from scipy.sparse.linalg import splu
 
-from ...core.algebra import Array, Mask
+from ...core.algebra import Array
 from ..normal.lcp import EPS
 
 # CHOSEN: conditions that may have changed; with more a factor of their own costs less
@@ -21,6 +21,29 @@ MOST = 20
 FEW = 3  # the same where the states stay, as several problems with them follow
 BASIS = 40  # iterations at most, after which the problem gets its own factor
 LEFT = 1e-10  # of the right side, that GMRES may leave: states that come next depend on it
+
+
+@dataclass(frozen=True, eq=False)
+class Jacobian:
+    """Hold J = R G + D.
+
+    Attributes:
+        G: (m d, m d) sparse.
+        R: (m, d, d) blocks on the diagonal.
+        D: (m, d, d) the same.
+    """
+
+    G: sp.csr_matrix
+    R: Array
+    D: Array
+
+    def __matmul__(self, v: Array) -> Array:
+        """Return J v (m d,)."""
+        shape = self.R.shape[:2]
+        w = np.asarray(self.G @ v).reshape(shape)
+        product = np.einsum("ijk,ik->ij", self.R, w)
+        product += np.einsum("ijk,ik->ij", self.D, v.reshape(shape))
+        return np.asarray(product.ravel())
 
 
 class KeptFactor:
@@ -31,21 +54,24 @@ class KeptFactor:
         iterations: of GMRES so far.
     """
 
-    def __init__(self) -> None:
-        self._lu: Any = None
-        self._free: Mask = np.zeros(0, dtype=bool)
+    def __init__(self, factor: Any) -> None:
+        """Begin without a factor.
+
+        Args:
+            factor: makes one and solves with it: ``kernels.fronts.Fronts`` or its like.
+        """
+        self._factor = factor
         self._marks: Array | None = None  # of the factor
         self._before: Array | None = None  # of the last problem
         self.factors = 0
         self.iterations = 0
 
-    def solve(self, J: sp.csr_matrix, free: Mask, right: Array, marks: Array) -> Array | None:
+    def solve(self, J: Jacobian, right: Array, marks: Array) -> Array | None:
         """Return J⁻¹ right, nearly; None where J is singular.
 
         Args:
-            J: (n, n) the Jacobian.
-            free: (n,) which rows are not those of the identity.
-            right: (n,) zero in the others.
+            J: the Jacobian.
+            right: (n,).
             marks: (m, …) what tells the states of the m conditions apart.
         """
         if not right.any():
@@ -59,7 +85,7 @@ class KeptFactor:
                 self.iterations += count
                 if is_done:
                     return x
-        if not self._factorise(J, free):
+        if not self._factorise(J):
             return None
         self._marks = self._before = marks
         x, count, _ = self._iterate(J, right)
@@ -69,29 +95,17 @@ class KeptFactor:
     @property
     def bytes(self) -> float:
         """Return the memory of the factor."""
-        return 0.0 if self._lu is None else 12.0 * self._lu.nnz
+        return float(self._factor.bytes)
 
-    def _factorise(self, J: sp.csr_matrix, free: Mask) -> bool:
+    def _factorise(self, J: Jacobian) -> bool:
         """Make the factor of J, and say whether there is one."""
         self.factors += 1
-        self._free = free
         self._marks = None
-        block = sp.csc_matrix(J[free][:, free])
-        try:
-            self._lu = splu(block, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-        except RuntimeError:  # exactly singular
-            return False
-        return True
+        return bool(self._factor.factorise(J.R, J.D))
 
-    def _precondition(self, v: Array) -> Array:
-        """Return what the kept factor makes of v."""
-        x = v.copy()
-        x[self._free] = self._lu.solve(v[self._free])
-        return x
-
-    def _iterate(self, J: sp.csr_matrix, right: Array) -> tuple[Array, int, bool]:
+    def _iterate(self, J: Jacobian, right: Array) -> tuple[Array, int, bool]:
         """Return the solution of GMRES, its iterations, and whether it reached its goal."""
-        start = self._precondition(right)
+        start = self._factor.solve(right)
         size = float(np.linalg.norm(start))
         if not np.isfinite(size) or size == 0.0:
             return start, 1, size == 0.0
@@ -103,7 +117,7 @@ class KeptFactor:
         turns: list[tuple[float, float]] = []
         for k in range(BASIS):
             # The next vector, at right angles to those before; twice, for its last digits.
-            v = self._precondition(J @ basis[k])
+            v = self._factor.solve(J @ basis[k])
             before = float(np.linalg.norm(v))
             for _ in range(2):
                 part = basis[: k + 1] @ v

@@ -8,8 +8,9 @@ are all reactions, and its rows
                                                    t·w_t + turning t·r_t = 0  (in space)
 
 make a Jacobian  J = R G + D  with blocks R, D (d, d) of the conditions, as sparse as G. Problem
-after problem is solved with a factor that is kept (``kept_factor``). Linear problems need not be
-solved exactly: Newton goes on from what is left, and ends at rounding.
+after problem is solved with a factor by bodies (``fronts``) that is kept (``kept_factor``). The
+first problem has the states of the last step, and so its factor. Linear problems need not be solved
+exactly: Newton goes on from what is left, and ends at rounding.
 """
 
 from functools import cached_property
@@ -20,8 +21,10 @@ import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, Mask, max_abs
 from ...core.errors import InputError
-from ..normal.lcp import SYMMETRIC
-from .kept_factor import KeptFactor
+from ...kernels.dissection import dissect
+from ...kernels.fronts import Fronts
+from ..normal.lcp import EPS, SYMMETRIC
+from .kept_factor import Jacobian, KeptFactor
 from .linear import States
 from .problem import LastIterate, ScaledDelassus, ScaledProblem
 
@@ -105,7 +108,14 @@ class SparseNewton:
     """
 
     def __init__(
-        self, method: Any, G: sp.csr_matrix, shift: sp.csr_matrix, bilateral: Mask
+        self,
+        method: Any,
+        G: sp.csr_matrix,
+        shift: sp.csr_matrix,
+        bilateral: Mask,
+        *,
+        touched: sp.csr_matrix,
+        points: Array,
     ) -> None:
         """Scale G.
 
@@ -114,13 +124,19 @@ class SparseNewton:
             G: (m d, m d).
             shift: (m d, m d) what is added to G in Jacobians alone, that they be regular.
             bilateral: (m,) which rows are bilateral.
+            touched: (m, bodies) not zero where a condition reads a body.
+            points: (m, dimension) where conditions are [m].
         """
         self._method = method
         self.delassus = SparseDelassus(G, bilateral)
         by_scale = sp.diags(self.delassus.scale.ravel())
         self._shift = sp.csr_matrix(by_scale @ shift @ by_scale)
         self._shifted = sp.csr_matrix(self.delassus.matrix + self._shift)
-        self.kept = KeptFactor()
+        d = self.delassus.dimension
+        together = _couple(self._shift, d) @ touched
+        fronts = Fronts(self._shifted, dissect(sp.csr_matrix(together), points), d)
+        self.kept = KeptFactor(fronts)
+        self._before: Array | None = None  # r - w of the last answer
 
     def solve(self, step: ScaledProblem, guess: Array | Mask | None) -> LastIterate:
         """Solve problem (1) of ``problem``, as far as rounding lets it.
@@ -135,14 +151,31 @@ class SparseNewton:
         r = step.start(guess if step.unit > 0.0 else None)
         if not step.unit > 0.0:
             return LastIterate(r, 0, [])
-        last, tolerance = self._iterate(step, r)
+        # Most states are those of the step before, whose factor is there. Where that leads nowhere
+        # the states of the guess are the first.
+        if self._before is not None:
+            first = States(step, self._before, None)
+            self._before = None
+            last, tolerance = self._iterate(step, r, first)
+            if step.residual(last.r, step.w(last.r)) <= tolerance * step.unit:
+                self._before = last.r - step.w(last.r)
+                return last
+        last, tolerance = self._iterate(step, r, None)
         step.result(self._method, tolerance, last)  # refuses
+        self._before = last.r - step.w(last.r)
         return last
 
-    def _iterate(self, step: ScaledProblem, r: Array) -> tuple[LastIterate, float]:
+    def _iterate(
+        self, step: ScaledProblem, r: Array, first: States | None
+    ) -> tuple[LastIterate, float]:
         """Iterate by Newton's method until nothing but rounding is left, or in circles.
 
         With where it ended comes the residual that this may have, that of r = 0 being 1.
+
+        Args:
+            step: the problem.
+            r: (m, d) reactions to start from, scaled.
+            first: the states of the first linear problem; None: those of r.
         """
         tolerance = self._method.tolerance
         goal = tolerance * step.unit
@@ -156,7 +189,8 @@ class SparseNewton:
         while len(history) < MOST_STEPS:
             # States of the shifted problem, w + σ Z Zᵀ (r - center): it is regular.
             before = b"" if states is None else states.key
-            states = States(step, r - w - self._spread(r - center), states)
+            states = first or States(step, r - w - self._spread(r - center), states)
+            first = None
             if states.key != before:
                 seen[states.key] = seen.get(states.key, 0) + 1
                 if seen[states.key] > SEEN:
@@ -207,9 +241,9 @@ class SparseNewton:
         R, D, free = _pose(states)
         left = -np.einsum("ijk,ik->ij", R, w) - np.einsum("ijk,ik->ij", D, r - states.fixed)
         left[~free] = 0.0
-        J = sp.csr_matrix(_block_matrix(R) @ self._shifted + _block_matrix(D))
+        J = Jacobian(self._shifted, R, D)
         marks = np.column_stack([states.closed, states.stick, states.direction])
-        dr = self.kept.solve(J, free.ravel(), left.ravel(), marks)
+        dr = self.kept.solve(J, left.ravel(), marks)
         if dr is None or not np.isfinite(dr).all():
             return None
         return _put(states, r + dr.reshape(r.shape))
@@ -228,14 +262,21 @@ def _put(states: States, r: Array) -> Array:
     return np.column_stack([r_n, np.where(states.stick[:, None], r[:, 1:], slips)])
 
 
-def _block_matrix(blocks: Array) -> sp.csr_matrix:
-    """Return the matrix of blocks (m, d, d) on its diagonal."""
-    m, d, _ = blocks.shape
-    columns = np.arange(m)
-    starts = np.arange(m + 1)
-    matrix = sp.csr_matrix(sp.bsr_matrix((blocks, columns, starts), shape=(m * d, m * d)))
-    matrix.eliminate_zeros()
-    return matrix
+def _couple(shift: sp.csr_matrix, d: int) -> sp.csr_matrix:
+    """Return which conditions a shift couples, (m, m), each with itself.
+
+    Stones that meet at a corner have joints without a common body, which the shift couples.
+
+    Args:
+        shift: (m d, m d).
+        d: rows of a condition.
+    """
+    m = shift.shape[0] // d
+    entries = sp.coo_matrix(shift)
+    large = np.abs(entries.data) > EPS * max_abs(entries.data)
+    places = (entries.row[large] // d, entries.col[large] // d)
+    pattern = sp.csr_matrix((np.ones(len(places[0])), places), shape=(m, m))
+    return sp.csr_matrix(pattern + sp.identity(m))
 
 
 def _pose(states: States) -> tuple[Array, Array, Mask]:
