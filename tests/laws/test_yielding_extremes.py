@@ -37,6 +37,10 @@ PRINCIPAL = (
     (1e-9, 0.0, 0.0),
     (0.0, 0.0, 0.0),
 )
+SIZES = (2e-5, 2e-4, 2e-3, 0.2)
+TURNS = 4
+PRESS = len(SIZES) * TURNS * PRINCIPAL.index((0.0, 0.0, -1.0))
+BETWEEN_THREE = {PRESS + len(SIZES) * turn + SIZES.index(2e-4) for turn in range(TURNS)}
 
 
 def make_ways(n: int) -> np.ndarray:
@@ -44,14 +48,14 @@ def make_ways(n: int) -> np.ndarray:
     rng = np.random.default_rng(3)
     tensors = []
     for values in PRINCIPAL:
-        for turn in range(4):
+        for turn in range(TURNS):
             Q = np.eye(3)
             if turn and n == 6:
                 Q, _ = np.linalg.qr(rng.standard_normal((3, 3)))
             elif turn:
                 a = rng.uniform(0.0, np.pi)
                 Q[:2, :2] = [[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]]
-            for size in (2e-5, 2e-4, 2e-3, 0.2):
+            for size in SIZES:
                 tensors.append(size * Q @ np.diag(values) @ Q.T)
     return to_vectors(np.array(tensors), n)
 
@@ -61,7 +65,8 @@ def make_ways(n: int) -> np.ndarray:
 def test_corners_of_the_surface(name: str, n: int) -> None:
     """The equations of the law and the balance of energy to round-off, D >= 0, and the tangent is
     the derivative of the stress on one side at least, by differences of 1e-10: some of these ends
-    are just between two pieces of the surface, and of 176 two at most between three."""
+    are just between two pieces of the surface. Between three, where neither side need be its own,
+    ends Tresca on the way back from the press (0, 0, -1) of 2e-4 alone, in all turns of it."""
     law = LAWS[name]
     ways = make_ways(n)
     rng = np.random.default_rng(5)
@@ -86,6 +91,6 @@ def test_corners_of_the_surface(name: str, n: int) -> None:
         forwards = np.linalg.norm(ahead["sigma"] - new["sigma"] - exact, axis=1) / size
         backwards = np.linalg.norm(new["sigma"] - behind["sigma"] - exact, axis=1) / size
         error = np.minimum(forwards, backwards)
-        worst = np.count_nonzero(error > 1e-3)
-        assert worst <= 2, np.flatnonzero(error > 1e-3)
+        missed = set(np.flatnonzero(error > 1e-3).tolist())
+        assert missed <= (BETWEEN_THREE if name == "Tresca" and turn == 1 else set()), missed
         state = new
