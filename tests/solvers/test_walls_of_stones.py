@@ -155,6 +155,7 @@ def test_fronts_give_what_one_matrix_gives(d: int) -> None:
     B = sp.kron(touched, np.ones((d, 4))).tocsr()
     B.data = rng.normal(size=B.nnz)
     G = sp.csr_matrix(B @ B.T + sp.identity(m * d))
+    G.data = G.data.astype(np.float32).astype(float)  # fronts hold G in single precision
     fronts = Fronts(G, dissect(touched, points), d)
     R = np.tile(np.eye(d), (m, 1, 1))
     D = np.zeros((m, d, d))

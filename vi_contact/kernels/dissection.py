@@ -13,7 +13,7 @@ import scipy.sparse as sp
 
 from ..core.algebra import Array, Indices
 
-SMALL = 60  # conditions that are not parted any more: a dense block of them takes no time
+SMALL = 30  # conditions that are not parted any more: a dense block of them takes no time
 
 
 @dataclass(frozen=True, eq=False)

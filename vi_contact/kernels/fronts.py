@@ -42,9 +42,9 @@ class Front:
     pivots: Indices
     outer: Indices
     near: Indices
-    own: Array
-    right: Array
-    down: Array
+    own: Any
+    right: Any
+    down: Any
     children: tuple[tuple[int, Indices], ...]
 
 
@@ -86,7 +86,8 @@ class Fronts:
             self._fronts.append(front)
             p = float(len(front.pivots))
             b = float(len(front.outer))
-            self.bytes += 8.0 * (p * p + 2.0 * p * b + front.own.size + front.right.size)
+            self.bytes += 8.0 * (p * p + 2.0 * p * b)
+            self.bytes += 4.0 * (front.own.size + front.right.size)
         self._inverses: list[Array] = []
         self._rights: list[Array] = []
         self._downs: list[Array] = []
@@ -102,8 +103,9 @@ class Fronts:
         children = tuple(
             (child, self._rows(here[self._fronts[child].border])) for child in part.children
         )
-        right = G[pivots][:, close].toarray()
-        down = G[close][:, pivots].toarray()
+        # In single precision, which takes half the memory: the iteration mends the last digits.
+        right = G[pivots][:, close].toarray().astype(np.float32)
+        down = G[close][:, pivots].toarray().astype(np.float32)
         if np.array_equal(right, down.T):
             right = down.T
         return Front(
@@ -112,7 +114,7 @@ class Fronts:
             pivots,
             outer,
             self._rows(np.flatnonzero(near)),
-            G[pivots][:, pivots].toarray(),
+            G[pivots][:, pivots].toarray().astype(np.float32),
             right,
             down,
             children,
@@ -180,11 +182,11 @@ class Fronts:
         return x
 
 
-def _turn(R: Array, block: Array) -> Array:
+def _turn(R: Array, block: Any) -> Array:
     """Return R G (k d, n) of blocks R (k, d, d) and rows of G (k d, n)."""
     k, d, _ = R.shape
     if not k:
-        return block
+        return np.asarray(block)
     return np.asarray(R @ block.reshape(k, d, -1)).reshape(block.shape)
 
 
