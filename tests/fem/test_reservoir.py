@@ -179,6 +179,8 @@ def test_bad_reservoirs_are_refused_in_one_sentence(comm: Any) -> None:
         ({"level": 30.0, "model": "wet"}, "'added mass' or 'incompressible' or 'acoustic'"),
         ({"level": 30.0, "tail": 31.0}, "exchange face and tail_face"),
         ({"level": 30.0, "silt": 3.0, "silt_ratio": -1.0}, "silt_ratio"),
+        ({"level": 30.0, "silt": 31.0}, "the silt at 31 m is above the level 30 m"),
+        ({"level": 30.0, "silt": -1.0}, "the silt at -1 m is below the foot of 'face'"),
     ]
     for water, words in wrong:
         with pytest.raises(InputError, match=words):
@@ -186,3 +188,10 @@ def test_bad_reservoirs_are_refused_in_one_sentence(comm: Any) -> None:
     system, base = stand(comm, size, (3, 4), None)
     with pytest.raises(InputError, match="belong together"):
         fem.Reservoir(face=base, level=30.0, tail=3.0)
+    low = fem.Facets.where("low", base.mesh, lambda x: (x[0] > 0.5 * 30.0) & (x[1] < 11.0))
+    face = fem.Facets.where("face", base.mesh, lambda x: np.isclose(x[0], 0.0))
+    stone = vc.LinearElastic(E=25e9, nu=0.2, rho=2400.0)
+    for model in ("at rest", "acoustic"):
+        wet = fem.Reservoir(face=face, level=30.0, tail_face=low, tail=12.0, model=model)
+        with pytest.raises(InputError, match="the tail water 12 m is above the top of 'low' at 10"):
+            fem.assemble(base.mesh, stone, reservoir=wet)
