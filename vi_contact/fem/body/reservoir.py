@@ -34,6 +34,7 @@ from ...core.units import STANDARD_GRAVITY, WATER_WEIGHT
 from .. import compat
 from ..mesh.group_checks import facets_of
 from ..mesh.tagged_mesh import Facets
+from .absent import find_present
 from .acoustic_water import OVERTONES, WaterData, count_columns, count_modes
 from .loads import Pressure
 from .space import FemSpace
@@ -329,10 +330,21 @@ class Reservoir:
 
 
 def _find_ends(space: FemSpace, face: Facets) -> tuple[float, float]:
-    """Return the lowest and the highest height [m] of nodes of a face. Collective."""
-    heights = space.points[space.facet_blocks(face.indices), -1]
+    """Return the lowest and the highest height [m] of nodes of a face. Collective.
+
+    Raises:
+        InputError: a face of bodies that are absent.
+    """
+    there = face.indices[find_present(space.mesh, space.absent, face)]
+    heights = space.points[space.facet_blocks(there), -1]
     bottom = -largest(space.comm, np.max(-heights, initial=-np.inf))
-    return bottom, largest(space.comm, np.max(heights, initial=-np.inf))
+    top = largest(space.comm, np.max(heights, initial=-np.inf))
+    if bottom > top:
+        raise InputError(
+            f"Reservoir: '{face.name}' is the face of bodies that are absent: give a reservoir "
+            "when they are there"
+        )
+    return bottom, top
 
 
 def add_water(reservoir: Reservoir | None, space: FemSpace, thickness: float) -> None:
