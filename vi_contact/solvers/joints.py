@@ -229,6 +229,9 @@ class JointSolver:
                 self.passes.append(count)
                 return step, answer
             used = step.joint.used
+        found = self._solve_sprung(base, joint, small)
+        if found is not None:
+            return found
         # Passes by whole steps take another way, and ask methods that were named to escalate to.
         return self._solve_whole(base, joint, joint.guess(base))
 
@@ -304,6 +307,54 @@ class JointSolver:
             if further is None:
                 return step, None
             expected = further
+
+    def _solve_sprung(
+        self, base: StepProblem, joint: JointStep, small: CondensedPasses
+    ) -> tuple[StepProblem, Certified] | None:
+        """Return the answer by passes that take the tension on springs. Collective.
+
+        A point that has opened by very little closes on a steep line, F(kappa) g/kappa. Passes with
+        constant strengths overshoot there, from a point that is open to one that is nearly closed
+        and back. Here a pass has the law as a line about an expected end, so that the tension
+        follows the opening inside it. None where that does not end either.
+
+        Args:
+            base: the step without its joint.
+            joint: at the beginning.
+            small: makes the passes.
+        """
+        surface = base.surface
+        gap = np.asarray(surface.everywhere(joint.g0))
+        slip = np.zeros((len(gap), small.width - 1))
+        least = np.inf
+        part = 1.0
+        for count in range(1, MOST + 1):
+            g1 = surface.mine(gap)
+            s1 = joint.s0 + surface.mine(slip)
+            used = joint.ask(g1, s1)
+            step = joint.apply(base, used)
+            springs = step.scale * np.asarray(
+                surface.everywhere(joint.find_slope(g1, s1).tension)
+            )
+            push = find_push(step, small.width)
+            try:
+                expected = small.make_sprung(step, push, gap, springs)
+            except StepFailure:
+                return None
+            if expected is None:
+                return None
+            line = used.tension + surface.mine(springs * (expected.gap - gap)) / step.scale
+            there = joint.ask(surface.mine(expected.gap), joint.s0 + surface.mine(expected.slip))
+            lag = compare(surface, there, used._replace(tension=line), 0.0 * line, 0.0 * line, 1.0)
+            step, answer = self._follow(base, joint, small, expected, count)
+            if answer is not None:
+                self.passes.append(MOST + count)
+                return step, answer
+            part = min(1.0, 2.0 * part) if lag < least else 0.5 * part
+            least = min(least, lag)
+            gap = gap + part * (expected.gap - gap)
+            slip = slip + part * (expected.slip - slip)
+        return None
 
     def _finish(
         self, step: StepProblem, small: CondensedPasses, push: Array, end: PassEnd, count: int
