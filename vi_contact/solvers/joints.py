@@ -345,7 +345,10 @@ class JointSolver:
                 return None
             line = used.tension + surface.mine(springs * (expected.gap - gap)) / step.scale
             there = joint.ask(surface.mine(expected.gap), joint.s0 + surface.mine(expected.slip))
-            lag = compare(surface, there, used._replace(tension=line), 0.0 * line, 0.0 * line, 1.0)
+            limit = used.cohesion - used.mu * used.tension
+            friction = np.abs(there.cohesion - there.mu * there.tension - limit)
+            force = max_abs(step.b) / step.scale
+            lag = compare(surface, there, used._replace(tension=line), friction, limit, force)
             step, answer = self._follow(base, joint, small, expected, count)
             if answer is not None:
                 self.passes.append(MOST + count)
