@@ -110,7 +110,8 @@ class CondensedPasses:
         self._rigid = rigid
         self._name = name
         self.width = len(compliance) // max(surface.total, 1)
-        self._free = np.zeros(0)
+        self._free = self._b = np.zeros(0)
+        self._is_spent = False
 
     @cached_property
     def stiffness(self) -> Array | None:
@@ -123,7 +124,9 @@ class CondensedPasses:
 
     def begin(self, base: StepProblem) -> None:
         """Find the free motion of a step. Collective."""
+        self._b = base.b
         self._free = self._condensed.find_free_motion(base.b)
+        self._is_spent = False
 
     def make(self, step: StepProblem, push: Array, before: PassEnd | None = None) -> PassEnd:
         """Return where a step leads whose loads are those of the base and a push. Collective.
@@ -198,7 +201,7 @@ class CondensedPasses:
         r = (self.stiffness @ (moved - q).ravel()).reshape(values.shape)
         held = np.zeros(values.size, dtype=bool)
         places = (expected.gap, expected.slip, r, expected.closed, expected.sticks)
-        return PassEnd(*places, held, values.ravel(), 0)
+        return PassEnd(*places, held, (values - moved).ravel(), 0)
 
     def _read_values(self, step: StepProblem) -> Array:
         """Return bounds and slips before (M, d) [m] of all conditions. Collective."""
@@ -207,12 +210,16 @@ class CondensedPasses:
             columns.append(step.slip0)
         return np.asarray(self.surface.everywhere(np.hstack(columns)))
 
-    def settle(self, step: StepProblem, end: PassEnd) -> tuple[PassEnd, float]:
+    def settle(
+        self, step: StepProblem, end: PassEnd, *, force: float = 0.0
+    ) -> tuple[PassEnd, float]:
         """Return an end with its reactions put onto their conditions, and by how much. Collective.
 
         Args:
             step: with its own bound and friction.
             end: what ``balance`` has returned.
+            force: of a joint whose tension is on springs, ``scale`` times newtons. Reactions may be
+                rounding beside it, and open points are held where they are expected.
 
         Returns:
             The end, and the largest change of a reaction over the largest reaction.
@@ -229,11 +236,14 @@ class CondensedPasses:
             e = np.divide(end.slip, way[:, None], out=np.zeros(end.slip.shape), where=goes[:, None])
             beyond = np.where(goes, 0.0, np.linalg.norm(r[:, 1:], axis=1) - limit)
             r[:, 1:] = np.where(goes[:, None], limit[:, None] * e, r[:, 1:])
-        size = max_abs(end.r)
+        size = max(max_abs(end.r), force)
         missing = max(max_abs(r - end.r), beyond.max(initial=0.0)) / (size or 1.0)
         held = np.repeat(end.sticks[:, None], self.width, axis=1)
         held[:, 0] = (r[:, 0] != 0.0) & self._rigid
         held &= bool(r.any())
+        if force > 0.0:
+            # A tension on a steep line feels the rounding of an opening: it stays as expected.
+            held[:, 0] |= ~end.closed & self._rigid
         return replace(end, r=r, held=held.ravel()), float(missing)
 
     def _find_limit(self, step: StepProblem, r_n: Array) -> Array:

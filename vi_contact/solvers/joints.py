@@ -8,6 +8,11 @@ the same ones; where it meets all conditions it has the answer, as it mostly doe
 is made. Where a pass is no better than the best one, a part of Newton's step is gone. A joint that
 holds everywhere needs no pass.
 
+A point that has opened by very little closes on a steep line, F(kappa) g/kappa. There a constant
+strength moves a point much further than the law would, and passes may go to and fro for good. After
+``MOST`` of them the tension follows the opening *inside* a pass, as a spring of the law's slope
+(``CondensedPasses.make_sprung``), which a few passes settle.
+
 Where Newton's matrix is not positive, the joint loses more than the bodies give way: the step has
 several answers (*snap-back*). The next pass then takes the strengths of the answer as they are,
 which goes on from the strength before the step, and the log says so.
@@ -73,7 +78,7 @@ class JointSolver:
         self._solve = solve
         self._make_passes = getattr(prepared, "make_passes", None)
         self._tolerance = tolerance
-        self._advice = advice
+        self._advice = advice if self._make_passes else f"give solver=Condensed(), or {advice}"
         self.passes: list[int] = []
         self.snapped = 0
         self._rates: RatePasses | None = None
@@ -271,6 +276,8 @@ class JointSolver:
         small: CondensedPasses,
         expected: Expected,
         count: int,
+        *,
+        force: float = 0.0,
     ) -> tuple[StepProblem, Certified | None]:
         """Repeat Newton's method from where it leads, while the sets stay. Collective.
 
@@ -283,6 +290,7 @@ class JointSolver:
             small: makes the passes.
             expected: the end of the step after the last pass.
             count: how many passes there were.
+            force: beside which reactions may be rounding, ``scale`` times newtons.
 
         Returns:
             The step with the last strength, and its certified answer; None: it has none.
@@ -296,7 +304,7 @@ class JointSolver:
             step = joint.apply(base, used)
             push = find_push(step, small.width)
             there = small.balance(step, push, expected)
-            end, missing = small.settle(step, there)
+            end, missing = small.settle(step, there, force=force)
             if missing <= AIM * self._tolerance:
                 answer = _certify(step, small, push, end, count)
                 return step, answer if answer.worst <= self._tolerance else None
@@ -311,12 +319,10 @@ class JointSolver:
     def _solve_sprung(
         self, base: StepProblem, joint: JointStep, small: CondensedPasses
     ) -> tuple[StepProblem, Certified] | None:
-        """Return the answer by passes that take the tension on springs. Collective.
+        """Return the answer by passes whose tension is on springs; None: there is none. Collective.
 
-        A point that has opened by very little closes on a steep line, F(kappa) g/kappa. Passes with
-        constant strengths overshoot there, from a point that is open to one that is nearly closed
-        and back. Here a pass has the law as a line about an expected end, so that the tension
-        follows the opening inside it. None where that does not end either.
+        They begin at the state before the step. Each has the law as a line about an expected end,
+        and its own end is the next one. The limit of friction is that of the expected end.
 
         Args:
             base: the step without its joint.
@@ -327,29 +333,35 @@ class JointSolver:
         gap = np.asarray(surface.everywhere(joint.g0))
         slip = np.zeros((len(gap), small.width - 1))
         least = np.inf
-        part = 1.0
+        part = 1.0  # of a pass that is gone
         for count in range(1, MOST + 1):
             g1 = surface.mine(gap)
             s1 = joint.s0 + surface.mine(slip)
             used = joint.ask(g1, s1)
             step = joint.apply(base, used)
-            springs = step.scale * np.asarray(
-                surface.everywhere(joint.find_slope(g1, s1).tension)
-            )
+            slope = np.asarray(surface.everywhere(joint.find_slope(g1, s1).tension))
+            # A closed point loses nothing until it opens.
+            springs = step.scale * np.where(gap > 0.0, slope, np.maximum(slope, 0.0))
             push = find_push(step, small.width)
             try:
                 expected = small.make_sprung(step, push, gap, springs)
+                if expected is None:  # a snap-back: what is lost is lost between the passes
+                    springs = np.maximum(springs, 0.0)
+                    expected = small.make_sprung(step, push, gap, springs)
             except StepFailure:
                 return None
             if expected is None:
                 return None
+
+            # What its end misses: the tension of the law there against that of the line, and the
+            # limits of friction at both ends.
             line = used.tension + surface.mine(springs * (expected.gap - gap)) / step.scale
             there = joint.ask(surface.mine(expected.gap), joint.s0 + surface.mine(expected.slip))
             limit = used.cohesion - used.mu * used.tension
             friction = np.abs(there.cohesion - there.mu * there.tension - limit)
             force = max_abs(step.b) / step.scale
             lag = compare(surface, there, used._replace(tension=line), friction, limit, force)
-            step, answer = self._follow(base, joint, small, expected, count)
+            step, answer = self._follow(base, joint, small, expected, count, force=max_abs(push))
             if answer is not None:
                 self.passes.append(MOST + count)
                 return step, answer
