@@ -336,14 +336,13 @@ class Joint(OfPoints):
         tension = self.spread("tension", count)
         mean = tension * self._find_mean(committed, g0, g1, walk)
         way = g1 - g0
-        opened = committed["opened"]
         is_long = way > SHORT * dc
-        is_long |= (g0 < opened) & (opened < g1)  # the mean is not near the law, however short
         change = tension * self._left(last, dc) - mean
         of_mean = np.divide(change, way, out=np.zeros(count), where=is_long)
         if self.softening == "linear":
             at_once = np.where(last < dc, -0.5 * tension / dc, 0.0)
             of_mean = np.where(is_long, of_mean, at_once)
+        opened = committed["opened"]
         on_secant = (g1 < opened) | ((g1 == opened) & (g0 < opened))
         return Slope(np.where(on_secant, 0.5 * tension * walk.secant, of_mean), np.zeros(count))
 

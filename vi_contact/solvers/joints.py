@@ -46,6 +46,8 @@ MOST = 100  # passes of a step
 FASTER = 0.1  # of what was missed before: Newton's method goes on with the sets that it has
 # of the largest reaction: what an end misses that is near enough to be the one that passes lead to
 CLOSE = 1e-3
+SPRUNG = 200  # passes of a step on springs
+SHARE = 0.1  # the least part of a pass on springs that is gone
 AIM = 0.1  # of the tolerance: what passes on the contact unknowns come to
 WATER = 400  # times that water follows what a static stage has opened
 ADVICE = "try a smaller dt, or a joint that loses its strength over a longer way"
@@ -334,7 +336,7 @@ class JointSolver:
         slip = np.zeros((len(gap), small.width - 1))
         least = np.inf
         part = 1.0  # of a pass that is gone
-        for count in range(1, MOST + 1):
+        for count in range(1, SPRUNG + 1):
             g1 = surface.mine(gap)
             s1 = joint.s0 + surface.mine(slip)
             used = joint.ask(g1, s1)
@@ -345,7 +347,10 @@ class JointSolver:
             push = find_push(step, small.width)
             try:
                 expected = small.make_sprung(step, push, gap, springs)
-                if expected is None:  # a snap-back: what is lost is lost between the passes
+                if expected is None:
+                    # A snap-back: what is lost is lost between passes, which lead away from where
+                    # the step began, so that they miss more before they miss less.
+                    least = np.inf
                     springs = np.maximum(springs, 0.0)
                     expected = small.make_sprung(step, push, gap, springs)
             except StepFailure:
@@ -365,7 +370,7 @@ class JointSolver:
             if answer is not None:
                 self.passes.append(MOST + count)
                 return step, answer
-            part = min(1.0, 2.0 * part) if lag < least else 0.5 * part
+            part = min(1.0, 2.0 * part) if lag < least else max(0.5 * part, SHARE)
             least = min(least, lag)
             gap = gap + part * (expected.gap - gap)
             slip = slip + part * (expected.slip - slip)
