@@ -284,7 +284,7 @@ def taper(points: Any) -> Any:
 @pytest.mark.two_ranks
 def test_a_dam_goes_on_where_its_tension_is_steep(comm: Any) -> None:
     """Step 107 needs the tension on springs. All steps are certified with their strength, the
-    ledger closes, and ranks are alike. The crack is 4 cells, of the 6 m that the base bears."""
+    ledger closes to 2e-13, and ranks are alike. The crack is 6.4 m long, of a base of 21 m."""
     runs = []
     for ranks in (comm, MPI.COMM_SELF):
         problem = shaken(ranks)
@@ -292,7 +292,7 @@ def test_a_dam_goes_on_where_its_tension_is_steep(comm: Any) -> None:
         run = march(problem, state=rest, dt=2e-3, t_end=0.26)
         assert run.history["certificate"].max() < 1e-9
         defect = np.abs(run.history["energy_defect"]).max()
-        assert defect < 1e-7 * np.abs(run.history["work_input"]).max()
+        assert defect < 1e-11 * np.abs(run.history["work_input"]).max()
         runs.append(run.history)
     ours, alone = runs
     assert alone["crack_length"].max() > 4.0
