@@ -296,6 +296,76 @@ def test_a_block_is_thrown_into_a_corner(comm: Any, wall: Any, friction: Any) ->
     assert np.allclose(change[:2], impulse, rtol=1e-9)
 
 
+def throw(lengths: Any, divisions: Any, corner: Any, velocity: Any, law: Any, mu: float) -> Any:
+    """A leaning body that flies into the corner of as many planes as space has dimensions."""
+    from mpi4py import MPI
+
+    d = len(lengths)
+    middle = np.array(corner) + 0.5 * np.array(lengths)
+    R = np.eye(d)
+    R[:2, :2] = [[cos(0.3), -sin(0.3)], [sin(0.3), cos(0.3)]]
+    mesh, _ = fem.build_mesh(
+        BlockMesh(lengths=lengths, divisions=divisions, corner=corner), MPI.COMM_SELF
+    )
+    system = fem.assemble(
+        mesh,
+        law,
+        initial_velocity=velocity,
+        initial_displacement=lambda x: (x - middle) @ R.T - (x - middle),
+    )
+    planes = [vc.HalfSpace((0.0,) * d, tuple(normal)) for normal in np.eye(d)[::-1]]
+    surface = fem.joined_surfaces(
+        *[fem.contact_surface(system, obstacle=plane) for plane in planes]
+    )
+    friction = vc.Coulomb(mu) if mu else vc.Frictionless()
+    return vc.ContactProblem(system, surface, friction=friction)
+
+
+def follow_in_corner(problem: Any, **more: Any) -> np.ndarray:
+    """March, and return which planes were touched: nothing is behind one, or gains energy."""
+    before = 0.0
+    touched = np.zeros(problem.system.space.dimension)
+    surface = problem.surface
+    for state, report in vc.march(problem, **more):
+        if not before:
+            before = turning.find_energy(problem, report.old)
+        gap = surface.gap(state.t) - surface.normal_values(state.u)
+        assert gap.min() > -1e-12
+        assert turning.find_energy(problem, state) < before * (1.0 + 1e-9)
+        step = energy_balance(problem, report.old, report.new, report.averages())
+        assert abs(step.defect) < 1e-8 * before
+        touched += (surface.everywhere(state.r_n) > 0.0).reshape(len(touched), -1).sum(axis=1)
+    return touched
+
+
+STRIP = ((1.0, 0.02), (8, 1), (0.1, 0.3), (-5.0, -20.0))
+
+
+@pytest.mark.serial
+def test_a_stop_in_a_corner_is_stepped_on() -> None:
+    """A strip whose end is stopped has velocities that would turn its cells inside out in the next
+    step: that step begins where none is, in place of a force that is NaN."""
+    touched = follow_in_corner(throw(*STRIP, replace(SOFT, E=1e7), 0.0), dt=2e-3, steps=18)
+    assert touched[0] > 0
+
+
+@pytest.mark.serial
+def test_a_box_sticks_in_a_corner_in_space() -> None:
+    """A node that faces three rough planes rubs on those that it touches, and on no other one."""
+    problem = throw((0.5,) * 3, (2, 2, 2), (0.1,) * 3, (-3.0, -2.0, -5.0), SOFT, 0.4)
+    assert np.all(follow_in_corner(problem, dt=5e-3, steps=16) > 0)
+
+
+@pytest.mark.serial
+def test_a_step_that_crushes_a_body_is_made_in_halves() -> None:
+    """Refused whole, by a sentence with its place and the remedy, which then is right."""
+    problem = throw(*STRIP, replace(SOFT, E=1e7), 0.0)
+    with pytest.raises(StepFailure, match=r"balance at \(.*give the run dt=HalvedAtImpact"):
+        follow_in_corner(problem, dt=0.02, steps=3)
+    touched = follow_in_corner(problem, dt=vc.HalvedAtImpact(0.02, halvings=6), t_end=0.06)
+    assert touched[0] > 0
+
+
 @pytest.mark.long
 @pytest.mark.serial
 def test_a_thin_body_does_not_go_through_in_one_step() -> None:
