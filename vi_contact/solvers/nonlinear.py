@@ -249,8 +249,8 @@ class NonlinearSolver:
         raise StepFailure(
             f"{_name(step)} did not come below the certificate tolerance {self._tolerance:g}, as "
             f"where a step is so long that what lands crushes the cells behind it{place}: give "
-            "the run dt=HalvedAtImpact(dt, halvings=6), which makes such a step in shorter ones, or "
-            "a smaller dt"
+            "the run dt=HalvedAtImpact(dt, halvings=6), which makes such a step in parts, or a "
+            "smaller dt"
         )
 
     def _begin(self, step: StepProblem) -> Walk:
@@ -264,8 +264,6 @@ class NonlinearSolver:
         d = forces.find_start()
         if d is not None:
             start = self._find_upright(step, forces, d)
-            if not self._is_finite(step.b):  # the guess is inside out: sizes are those of the start
-                step = replace(step, b=start.rest, internal=forces.find_internal(start.d))
         elif step.internal is not None and not self._is_finite(step.internal):
             raise StepFailure(
                 f"{_name(step)} begins where its internal force is NaN or infinite: {self._advice}"

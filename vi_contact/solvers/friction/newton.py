@@ -116,7 +116,7 @@ class FrictionNewton(Settings):
             for _ in range(FIRST_SWEEPS * 2**attempt):
                 r = sweep(r)
                 sweeps += 1
-                # With a G that is not symmetric, or not positive, sweeps may grow: they lead nowhere.
+                # With a G that is not symmetric or positive sweeps may grow: they lead nowhere.
                 if not step.rounding(r) <= step.unit:
                     r = np.zeros_like(r)
                     break
