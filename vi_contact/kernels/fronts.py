@@ -95,7 +95,7 @@ class Fronts:
             self.operations_of_solve += 2.0 * p * (p + 2.0 * b)
             self.bytes += 4.0 * (p * p + 2.0 * p * b)
             self.bytes += 4.0 * (front.own.size + front.right.size)
-        self._kind = np.dtype(np.float32)
+        self._kind: Any = np.float32
         self._inverses: list[Array] = []
         self._rights: list[Array] = []
         self._downs: list[Array] = []
@@ -142,13 +142,13 @@ class Fronts:
             precise: in double precision, which takes twice the time and the memory.
         """
         d = self._shape[1]
-        self._kind = np.dtype(np.float64 if precise else np.float32)
+        self._kind = np.float64 if precise else np.float32
         schur: list[Array | None] = []
         self._inverses, self._rights, self._downs = [], [], []
         for front in self._fronts:
             p = len(front.pivots)
             b = len(front.outer)
-            F = np.zeros((p + b, p + b), dtype=self._kind)
+            F: Array = np.zeros((p + b, p + b), dtype=self._kind)
 
             # Rows of the part, and columns of it in the rows of its border.
             F[:p, :p] = _turn(R[front.conditions], front.own)

@@ -57,6 +57,7 @@ class KeptFactor:
         factors: how many were made.
         columns: of their inverses, that were computed for rows that changed.
         iterations: of GMRES so far.
+        operations: of all factors and solutions, multiplications and additions.
     """
 
     def __init__(self, factor: Any) -> None:
@@ -73,6 +74,7 @@ class KeptFactor:
         self.factors = 0
         self.columns = 0
         self.iterations = 0
+        self.operations = 0.0
 
     def solve(self, J: Jacobian, right: Array, marks: Array) -> Array | None:
         """Return J⁻¹ right, nearly; None where J is singular.
@@ -97,7 +99,7 @@ class KeptFactor:
             if not self._factorise(J, precise=precise):
                 return None
             self._marks = marks
-            x, count, is_done = self._iterate(J, right, self._factor.solve)
+            x, count, is_done = self._iterate(J, right, self._substitute)
             self.iterations += count
             if is_done:
                 break
@@ -111,7 +113,7 @@ class KeptFactor:
             changed: (k,) conditions whose rows differ from those of the factor.
         """
         if not len(changed):
-            return self._factor.solve  # type: ignore[no-any-return]
+            return self._substitute
         m, d, _ = J.R.shape
         new = np.setdiff1d(changed, self._known)
         ready = len(self._known) + len(new)
@@ -123,14 +125,14 @@ class KeptFactor:
             units = np.zeros((m * d, len(new) * d))
             rows = (new[:, None] * d + np.arange(d)).ravel()
             units[rows, np.arange(len(rows))] = 1.0
-            columns = self._factor.solve(units)
+            columns = self._substitute(units).T
             self.columns += len(rows)
             self._known = np.concatenate([self._known, new])
-            self._columns = np.hstack([self._columns.reshape(m * d, -1), columns])
+            self._columns = np.vstack([self._columns.reshape(-1, m * d), columns])
         place = np.empty(m, dtype=np.int64)
         place[self._known] = np.arange(len(self._known))
         own = (place[changed][:, None] * d + np.arange(d)).ravel()
-        W = self._columns[:, own]
+        W = self._columns[own].T
 
         # J = J₀ + E V, E the unit vectors of the changed rows, V = (R - R₀) G + (D - D₀) there.
         rows = (changed[:, None] * d + np.arange(d)).ravel()
@@ -151,7 +153,7 @@ class KeptFactor:
 
         def solve(v: Array) -> Array:
             """Return J⁻¹ v by the formula of Sherman, Morrison and Woodbury."""
-            y = self._factor.solve(v)
+            y = self._substitute(v)
             weights, _ = lapack.dgetrs(lu, pivots, change(y))
             return np.asarray(y - W @ weights)
 
@@ -162,9 +164,15 @@ class KeptFactor:
         """Return the memory of the factor."""
         return float(self._factor.bytes)
 
+    def _substitute(self, v: Array) -> Array:
+        """Return J₀⁻¹ v of v (n,) or (n, k)."""
+        self.operations += self._factor.operations_of_solve * (v.size // len(v))
+        return np.asarray(self._factor.solve(v))
+
     def _factorise(self, J: Jacobian, *, precise: bool) -> bool:
         """Make the factor of J, in double precision or single, and say whether there is one."""
         self.factors += 1
+        self.operations += self._factor.operations
         self._marks = None
         self._known = np.zeros(0, dtype=np.int64)
         self._columns = np.zeros((0, 0))
