@@ -100,7 +100,7 @@ def test_restarts_and_runs_agree(monkeypatch: Any) -> None:
     for _ in range(4):
         stepper.accept(stepper.attempt(1e-3))
     size = MPI.COMM_WORLD.allreduce(np.abs(straight.u).max(initial=0.0), MPI.MAX)
-    assert np.allclose(stepper.state.u, straight.u, rtol=0.0, atol=1e-8 * size)
+    assert np.allclose(stepper.state.u, straight.u, rtol=0.0, atol=1e-12 * size)
 
 
 @pytest.mark.serial
