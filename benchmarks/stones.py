@@ -15,12 +15,15 @@ Every step is certified. Numbers, of each wall, in lists:
 - ``bytes_per_condition``: of G, of factors of bodies, and of the factor of the last linear problem.
 - ``certificate``: the worst one.
 - ``linear_solves``, ``factors``, ``gmres``: linear problems, their factors and iterations a step.
+- ``columns``: of inverses, a step, by which factors are mended where rows change.
+- ``operations``: of factors and solutions with them, a step, multiplications and additions.
 - ``share_factor``, ``share_gmres``, ``share_bodies``, ``share_split``: of the time of the steps,
   what goes into factors of linear problems, into their iterations, into solves with A, and into
   the split over rings of joints.
 - ``set_up_s``: mesh, joints and matrices; ``prepare_s``: factors of bodies and G.
 
-``power`` is that by which ``ms_per_step`` grows with the stones, fitted over all walls.
+``power`` is that by which ``ms_per_step`` grows with the stones, fitted over all walls, and
+``power_of_operations`` the same of ``operations``.
 """
 
 from __future__ import annotations
@@ -101,7 +104,7 @@ def measure(stones: int, cells: tuple[int, int], steps: int) -> dict[str, float]
     clock.watch(Hyperstatic, "_split", "split")
     friction: Any = stepper.prepared[DT].first
     kept = friction.friction.small.kept
-    before = np.array([kept.factors, kept.iterations])
+    before = np.array([kept.factors, kept.iterations, kept.columns, kept.operations])
     certificate = 0.0
     solves = 0
     start = time.process_time()
@@ -112,7 +115,8 @@ def measure(stones: int, cells: tuple[int, int], steps: int) -> dict[str, float]
         solves += trial.report.result.iterations
     spent = time.process_time() - start
     clock.stop()
-    factors, iterations = np.array([kept.factors, kept.iterations]) - before
+    after = np.array([kept.factors, kept.iterations, kept.columns, kept.operations])
+    factors, iterations, columns, operations = after - before
 
     # A product with A, in the same run.
     A = stepper.prepared[DT].A
@@ -136,6 +140,8 @@ def measure(stones: int, cells: tuple[int, int], steps: int) -> dict[str, float]
         "linear_solves": solves / steps,
         "factors": factors / steps,
         "gmres": iterations / steps,
+        "columns": columns / steps,
+        "operations": operations / steps,
         **{f"share_{name}": seconds / spent for name, seconds in clock.seconds.items()},
         "set_up_s": set_up,
         "prepare_s": prepare,
@@ -167,9 +173,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(*(f"{key} {value:.3g}" for key, value in numbers.items()), sep="  ", flush=True)
     if len(walls) > 1:
         sizes = np.log(found["stones"])
-        found["power"] = float(np.polyfit(sizes, np.log(found["ms_per_step"]), 1)[0])
-        if COMM.rank == 0:
-            print(f"power {found['power']:.3g}")
+        for name, key in (("power", "ms_per_step"), ("power_of_operations", "operations")):
+            found[name] = float(np.polyfit(sizes, np.log(found[key]), 1)[0])
+            if COMM.rank == 0:
+                print(f"{name} {found[name]:.3g}")
     if options.json is not None and COMM.rank == 0:
         options.json.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     return 0

@@ -113,6 +113,28 @@ def test_all_states_of_a_node(kind, mu, count):
         assert min(apart) < 1e-8, (seed, apart, found)
 
 
+@pytest.mark.parametrize("slip", [0.5, -0.5])
+def test_a_split_that_loads_a_sliding_point_makes_it_rub(slip):
+    """A closed point slides without force, the other two of its ring stick: what the least split
+    gives it, normal force and friction, obeys the law and is against the slip."""
+    loaded = 0
+    for seed in range(20):
+        node = Node("ring", seed, 0.7)
+        small = node.prepare()
+        r = np.array([[1.0, 0.01], [1.0, -0.02], [0.0, 0.0]])
+        w = np.array([[0.0, 0.0], [0.0, 0.0], [0.0, -slip]])
+        scale = small._delassus.scale
+        q = (w - small._delassus.product(r.ravel()).reshape(3, 2)) / scale
+        step = small._delassus.problem(q, np.zeros(3), node.mu)
+        found = small._finish(step, r, 1, []).r
+        force = node.B.T @ (r * scale).ravel()
+        assert np.abs(node.B.T @ found.ravel() - force).max() < 1e-12 * np.abs(force).max()
+        size = np.abs(found).max()
+        assert abs(found[2, 1] - np.sign(slip) * node.mu[2] * found[2, 0]) < 1e-12 * size
+        loaded += found[2, 0] > 1e-6 * size
+    assert loaded >= 5
+
+
 @pytest.mark.parametrize("kind", ["two walls", "three walls", "ring", "crossing"])
 def test_the_split_does_not_depend_on_the_method(kind):
     """Newton's method and Gauss-Seidel sweeps end in other reactions of a ring, and the least split

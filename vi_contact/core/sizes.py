@@ -24,6 +24,22 @@ def refuse_dense(owner: str, rows: int, *, instead: str = "Iterative(), which st
         )
 
 
+def refuse_memory(owner: str, size: float, *, instead: str) -> None:
+    """Raise InputError for a factor that takes more memory than the largest dense matrix.
+
+    Args:
+        owner: class that stores the factor, the first word of the sentence.
+        size: what it takes [bytes], known before it is made.
+        instead: what to take, for the sentence.
+    """
+    most = 8.0 * DENSE_ROWS**2
+    if size > most:
+        raise InputError(
+            f"{owner} stores a factor of {1e-9 * size:.2g} GB on every rank, more than the "
+            f"{1e-9 * most:.2g} GB that it may take: take {instead}"
+        )
+
+
 def is_small_problem(comm: Comm, unknowns: int, conditions: int, *, worth: int = 1) -> bool:
     """Say whether a problem that the package solves beside the steps is small. Collective.
 

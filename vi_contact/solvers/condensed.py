@@ -124,7 +124,8 @@ class Condensed:
         Raises:
             InputError: for too many conditions.
         """
-        refuse_dense("Condensed()", surface.total)
+        if not self.takes_bodies(surface):
+            refuse_dense("Condensed()", surface.total)
         return PreparedCondensed(self, A, surface, scale)
 
     def takes_bodies(self, surface: ContactSurface) -> bool:
@@ -172,6 +173,7 @@ class PreparedCondensed:
     def _condense_normal(self) -> "NormalProblem":
         """Condense A onto the normal unknowns, unless that is done, and return what it gave."""
         if self._normal is None:
+            refuse_dense("Condensed()", self._surface.total)
             condensed = self._condense(frictional=False)
             bilateral = self._surface.everywhere(self._surface.bilateral)
             small = self._settings.method.prepare(condensed.flexibility, bilateral)

@@ -295,12 +295,14 @@ class Hyperstatic:
         newtons = r * self._delassus.scale
         if self._rings:
             ratio = self._delassus.scale[:, -1]
-            reach = np.linalg.norm(r[:, 1:], axis=1)
+            # Where friction is zero it would act against the slip: a split may load such a point.
+            toward = np.where(r[:, 1:].any(axis=1)[:, None], r[:, 1:], -w[:, 1:])
+            reach = np.linalg.norm(toward, axis=1)
             states = States(
                 closed=(r[:, 0] > 0.0) | bilateral | (w[:, 0] <= few),
                 stick=still,
                 bilateral=bilateral,
-                slip=r[:, 1:] / np.where(reach > 0.0, reach, 1.0)[:, None],
+                slip=toward / np.where(reach > 0.0, reach, 1.0)[:, None],
                 cohesion=step.cohesion * ratio,
                 slope=step.slope * ratio / self._delassus.scale[:, 0],
             )

@@ -1,26 +1,30 @@
 """Solve the linear problems of semismooth Newton with a sparse G by a factor that is kept.
 
-The Jacobian J of one set of states is factorised. Those of the next sets differ from it in the rows
-and columns of the conditions whose state has changed, and GMRES with the kept factor before it
-(Saad and Schultz, SIAM J. Sci. Stat. Comput. 7, 1986) corrects this: k changed rows cost at most
-k + 1 iterations, and none changed costs one. Where that takes too many the factor is made anew.
+The Jacobian J₀ of one set of states is factorised. Those of the next sets differ from it in the k
+rows of the conditions whose state has changed. With E the unit vectors of these rows
+
+    J = J₀ + E V,   J⁻¹ v = y - W (1 + V W)⁻¹ V y,   y = J₀⁻¹ v,   W = J₀⁻¹ E
+
+(Hager, SIAM Rev. 31, 1989, 221-239). Columns of W are kept as long as the factor, so that a row
+costs one solution when it first changes. GMRES around it (Saad and Schultz, SIAM J. Sci. Stat.
+Comput. 7, 1986) mends rounding. Where columns take too many operations the factor is made anew.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg import solve_triangular
+from scipy.linalg import lapack, solve_triangular
 
-from ...core.algebra import Array
+from ...core.algebra import Array, Indices
 from ..normal.lcp import EPS
 
-# CHOSEN: conditions that may have changed; with more a factor of their own costs less
-MOST = 20
-FEW = 3  # the same where the states stay, as several problems with them follow
 BASIS = 40  # iterations at most, after which the problem gets its own factor
-LEFT = 1e-10  # of the right side, that GMRES may leave: states that come next depend on it
+LEFT = 1e-6  # of the right side, that GMRES may leave: Newton's next problem mends it
+# CHOSEN: of the operations of a factor, that columns may take before it is made anew
+SHARE = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +55,9 @@ class KeptFactor:
 
     Attributes:
         factors: how many were made.
+        columns: of their inverses, that were computed for rows that changed.
         iterations: of GMRES so far.
+        operations: of all factors and solutions, multiplications and additions.
     """
 
     def __init__(self, factor: Any) -> None:
@@ -62,9 +68,13 @@ class KeptFactor:
         """
         self._factor = factor
         self._marks: Array | None = None  # of the factor
-        self._before: Array | None = None  # of the last problem
+        self._R = self._D = np.zeros(0)  # the same
+        self._known = np.zeros(0, dtype=np.int64)  # conditions whose columns are there
+        self._columns = np.zeros((0, 0))
         self.factors = 0
+        self.columns = 0
         self.iterations = 0
+        self.operations = 0.0
 
     def solve(self, J: Jacobian, right: Array, marks: Array) -> Array | None:
         """Return J⁻¹ right, nearly; None where J is singular.
@@ -77,35 +87,103 @@ class KeptFactor:
         if not right.any():
             return np.zeros_like(right)
         if self._marks is not None:
-            changed = np.count_nonzero((marks != self._marks).any(axis=1))
-            stays = self._before is not None and np.array_equal(marks, self._before)
-            if changed <= (FEW if stays else MOST):
-                self._before = marks
-                x, count, is_done = self._iterate(J, right)
+            changed = np.flatnonzero((marks != self._marks).any(axis=1))
+            mend = self._mend(J, changed)
+            if mend is not None:
+                x, count, is_done = self._iterate(J, right, mend)
                 self.iterations += count
                 if is_done:
                     return x
-        if not self._factorise(J):
-            return None
-        self._marks = self._before = marks
-        x, count, _ = self._iterate(J, right)
-        self.iterations += count
+        # A factor of its own, and where single precision has not the digits one in double.
+        for precise in (False, True):
+            if not self._factorise(J, precise=precise):
+                return None
+            self._marks = marks
+            x, count, is_done = self._iterate(J, right, self._substitute)
+            self.iterations += count
+            if is_done:
+                break
         return x
+
+    def _mend(self, J: Jacobian, changed: Indices) -> Callable[[Array], Array] | None:
+        """Return what solves with J by the factor kept; None where a factor of its own costs less.
+
+        Args:
+            J: the Jacobian.
+            changed: (k,) conditions whose rows differ from those of the factor.
+        """
+        if not len(changed):
+            return self._substitute
+        m, d, _ = J.R.shape
+        new = np.setdiff1d(changed, self._known)
+        ready = len(self._known) + len(new)
+        if ready * d * self._factor.operations_of_solve > SHARE * self._factor.operations:
+            return None
+
+        # Columns of the inverse at rows that had not changed before, all at once.
+        if len(new):
+            units = np.zeros((m * d, len(new) * d))
+            rows = (new[:, None] * d + np.arange(d)).ravel()
+            units[rows, np.arange(len(rows))] = 1.0
+            columns = self._substitute(units).T
+            self.columns += len(rows)
+            self._known = np.concatenate([self._known, new])
+            self._columns = np.vstack([self._columns.reshape(-1, m * d), columns])
+        place = np.empty(m, dtype=np.int64)
+        place[self._known] = np.arange(len(self._known))
+        own = (place[changed][:, None] * d + np.arange(d)).ravel()
+        W = self._columns[own].T
+
+        # J = J₀ + E V, E the unit vectors of the changed rows, V = (R - R₀) G + (D - D₀) there.
+        rows = (changed[:, None] * d + np.arange(d)).ravel()
+        R = J.R[changed] - self._R[changed]
+        D = J.D[changed] - self._D[changed]
+        G = J.G[rows]
+
+        def change(x: Array) -> Array:
+            """Return V x (k d, …)."""
+            moved = np.asarray(G @ x).reshape(len(changed), d, -1)
+            there = x[rows].reshape(len(changed), d, -1)
+            return np.asarray((R @ moved + D @ there).reshape(len(rows), *x.shape[1:]))
+
+        small = np.eye(len(rows)) + change(W)
+        lu, pivots, info = lapack.dgetrf(small)
+        if info:
+            return None
+
+        def solve(v: Array) -> Array:
+            """Return J⁻¹ v by the formula of Sherman, Morrison and Woodbury."""
+            y = self._substitute(v)
+            weights, _ = lapack.dgetrs(lu, pivots, change(y))
+            return np.asarray(y - W @ weights)
+
+        return solve
 
     @property
     def bytes(self) -> float:
         """Return the memory of the factor."""
         return float(self._factor.bytes)
 
-    def _factorise(self, J: Jacobian) -> bool:
-        """Make the factor of J, and say whether there is one."""
-        self.factors += 1
-        self._marks = None
-        return bool(self._factor.factorise(J.R, J.D))
+    def _substitute(self, v: Array) -> Array:
+        """Return J₀⁻¹ v of v (n,) or (n, k)."""
+        self.operations += self._factor.operations_of_solve * (v.size // len(v))
+        return np.asarray(self._factor.solve(v))
 
-    def _iterate(self, J: Jacobian, right: Array) -> tuple[Array, int, bool]:
+    def _factorise(self, J: Jacobian, *, precise: bool) -> bool:
+        """Make the factor of J, in double precision or single, and say whether there is one."""
+        self.factors += 1
+        self.operations += self._factor.operations
+        self._marks = None
+        self._known = np.zeros(0, dtype=np.int64)
+        self._columns = np.zeros((0, 0))
+        self._R, self._D = J.R, J.D
+        return bool(self._factor.factorise(J.R, J.D, precise=precise))
+
+    def _iterate(
+        self, J: Jacobian, right: Array, solve: Callable[[Array], Array]
+    ) -> tuple[Array, int, bool]:
         """Return the solution of GMRES, its iterations, and whether it reached its goal."""
-        start = self._factor.solve(right)
+        start = solve(right)
         size = float(np.linalg.norm(start))
         if not np.isfinite(size) or size == 0.0:
             return start, 1, size == 0.0
@@ -117,7 +195,7 @@ class KeptFactor:
         turns: list[tuple[float, float]] = []
         for k in range(BASIS):
             # The next vector, at right angles to those before; twice, for its last digits.
-            v = self._factor.solve(J @ basis[k])
+            v = solve(J @ basis[k])
             before = float(np.linalg.norm(v))
             for _ in range(2):
                 part = basis[: k + 1] @ v

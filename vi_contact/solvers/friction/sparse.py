@@ -21,6 +21,7 @@ import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, Mask, max_abs
 from ...core.errors import InputError
+from ...core.sizes import refuse_memory
 from ...kernels.dissection import dissect
 from ...kernels.fronts import Fronts
 from ..normal.lcp import EPS, SYMMETRIC
@@ -126,6 +127,9 @@ class SparseNewton:
             bilateral: (m,) which rows are bilateral.
             touched: (m, bodies) not zero where a condition reads a body.
             points: (m, dimension) where conditions are [m].
+
+        Raises:
+            InputError: a factor would take too much memory.
         """
         self._method = method
         self.delassus = SparseDelassus(G, bilateral)
@@ -135,6 +139,7 @@ class SparseNewton:
         d = self.delassus.dimension
         together = _couple(self._shift, d) @ touched
         fronts = Fronts(self._shifted, dissect(sp.csr_matrix(together), points), d)
+        refuse_memory("Condensed()", fronts.bytes, instead="fewer stones, or coarser ones")
         self.kept = KeptFactor(fronts)
         self._before: Array | None = None  # r - w of the last answer
 
