@@ -83,13 +83,16 @@ class Elimination:
             values: (full,) U at the held components, zero elsewhere; it is overwritten.
         """
         of_nodes = u[: len(u) - self.others]
-        if self._L is not None:
-            values = values + self._L @ values
+        values = self.lift(values)
         if self._P is None:
             values[self.free] = of_nodes
         else:
             values += self._P @ of_nodes
         return values
+
+    def lift(self, values: Array) -> Array:
+        """Return (I + L) values (full,): what follows held components in the mean moves too."""
+        return values if self._L is None else values + self._L @ values
 
     def pull(self, force: Array) -> Array:
         """Return Pᵀ f, forces on the free components; tied nodes count at their partners."""

@@ -28,15 +28,18 @@ from ...core.errors import InputError
 from ..body.blending import TiedSide
 from .clipping import areas, hats, rule, triangles
 from .matching import Matching, Side
-from .mortar_in_space import order_of, sum_entries, sum_rows
+from .mortar_in_space import ROUND_OFF, order_of, sum_entries, sum_rows
 from .nodes import Nodes
 from .segments import cut_segment, find_normals
-from .sight import WHOLE, Facets, Looks, facets_of, looks_of, opposite
+from .sight import Facets, Looks, facets_of, looks_of, opposite
 
 PLANE_POINTS = 0.5 + 0.5 * np.polynomial.legendre.leggauss(3)[0]  # on [0, 1]: of degree 5
 PLANE_WEIGHTS = 0.5 * np.polynomial.legendre.leggauss(3)[1]
 SECOND_ORDER = 2  # points a way that products of second order need more than those of first
-LITTLE = 1e-6  # of the mean share of a facet: less is the zero of a vertex of a triangle
+# CHOSEN: covered share of a facet of second order from which on the integrals of all its functions
+# over what is covered are safely positive; they are from 3/4 on
+ENOUGH = 0.9
+LITTLE = 0.1  # CHOSEN: of the mean share of a facet: less is the zero of a vertex of a triangle
 
 
 def couple_sides(
@@ -111,9 +114,8 @@ def _couple_second_order(
     """
     integrate = _integrate_in_plane if side.points.shape[1] == 2 else _integrate_in_space
     nodes, covered, products, mixed = integrate(side, own, other, opposite_side)
-    facets = nodes[np.unique(mixed[0])]
-    part = np.unique(mixed[0])
-    for facet in part[np.abs(covered[part] - 1.0) > WHOLE]:
+    part = np.flatnonzero(covered > ROUND_OFF)
+    for facet in part[covered[part] < ENOUGH]:
         where = describe_point(side.points[nodes[facet]].mean(axis=0))
         raise InputError(
             f"a part of the facet of '{side.name}' at {where} has nothing of '{other.name}' in "
@@ -125,6 +127,7 @@ def _couple_second_order(
             f"no part of '{other.name}' lies opposite '{side.name}', along the normals of the "
             "latter: choose the two boundaries between the bodies"
         )
+    facets = nodes[part]
     # psi = A phi on each facet, and what nodes that move as another one hand to the others
     phi = products[part].sum(axis=2)
     mean = phi.sum(axis=1, keepdims=True) / phi.shape[1]
@@ -138,14 +141,15 @@ def _couple_second_order(
     place = np.full(len(nodes), -1)
     place[part] = np.arange(len(part))
     facet, columns, values = mixed
-    M = sum_entries(functions[place[facet]] @ values, nodes[facet], columns, m, n)
+    used = np.flatnonzero(place[facet] >= 0)
+    own_functions = functions[place[facet[used]]]
+    M = sum_entries(own_functions @ values[used], nodes[facet[used]], columns[used], m, n)
     M = sp.csr_matrix(M) + sp.csr_matrix(sum_entries(-forces, facets, tied[facets], m, n))
     total = np.zeros(m)
     np.add.at(total, facets, D)
     rows = np.flatnonzero(total > 0.0)
-    measure = float(covered @ products.sum(axis=(1, 2))) / max(len(part), 1)
-    share = float(len(part)) / len(nodes) if measure else 0.0
-    return rows, sp.csr_matrix(sp.diags([1.0 / total[rows]], [0]) @ M[rows]), share
+    P = sp.csr_matrix(sp.diags([1.0 / total[rows]], [0]) @ M[rows])
+    return rows, P, float(products.sum()) / float(own.nodes.weights.sum())
 
 
 def _hand_over(
