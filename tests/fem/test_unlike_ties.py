@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 from fem_problems import field, linear
 
 import vi_contact as vc
 from vi_contact import fem
 from vi_contact.core.errors import InputError
+from vi_contact.laws import MohrCoulomb
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import Blocks, TwoBlocks
 
@@ -276,3 +278,151 @@ def test_held_sides_beside_a_tie(comm, d):
         for body in ("lower", "upper")
     )
     assert carried == pytest.approx(1e5 * (2.0 if d == 2 else 3.0), rel=1e-10)
+
+
+def halves(mesh, tags):
+    """Left and right halves of both sides of the interface of two blocks of length 2."""
+    import dolfinx
+
+    found = {}
+    mesh.topology.create_connectivity(1, 2)
+    for name in ("lower_top", "upper_bottom"):
+        indices = tags[name].indices
+        x = dolfinx.mesh.compute_midpoints(mesh, 1, indices)[:, 0]
+        for side, mask in (("left", x < 1.0), ("right", x > 1.0)):
+            found[name, side] = fem.Facets(f"{name}_{side}", indices[mask], mesh)
+    return found
+
+
+@pytest.mark.two_ranks
+def test_a_tie_beside_a_contact(comm):
+    """The left half of unlike boundaries is tied, the right half is a contact, and both meet at
+    x = 1: pressed by 1 MPa the pressure is 1 MPa; pulled, the right half opens, as on a mesh of 8
+    and 8 cells, whose end goes up by 17.25 mm, to the error of the mesh."""
+    lower, upper = (BlockMesh(lengths=(2.0, 1.0), divisions=(n, 4)) for n in (8, 6))
+    mesh, tags = fem.build_mesh(TwoBlocks(lower=lower, upper=upper), comm)
+    part = halves(mesh, tags)
+    material = vc.LinearElastic(E=1e9, nu=0.0, rho=2000.0)
+    one, two = (part[name, "left"] for name in ("lower_top", "upper_bottom"))
+    ends = []
+    for tie in (fem.Tied(one, two, matching=MORTAR), fem.Tied(two, one, matching=MORTAR)):
+        for load in (-1e6, 1e6):
+            pressed = fem.Traction(tags["upper_top"], (0.0, load))
+            system = fem.assemble(
+                mesh, material, clamped=tags["lower_bottom"], loads=pressed, tied=tie
+            )
+            sides = (part["upper_bottom", "right"], part["lower_top", "right"])
+            surface = fem.contact_pair(system, *sides, matching=MORTAR)
+            problem = vc.ContactProblem(system, surface)
+            state = vc.static_equilibrium(problem)
+            pressure = surface.everywhere(state.r_n / surface.weights)
+            assert len(pressure) == 3
+            assert pressure == pytest.approx(np.full(3, max(-load, 0.0)), rel=1e-9, abs=1e-3)
+            points, u = field(system, problem.cartesian(state.u))
+            ends.append(u[np.linalg.norm(points - [2.0, 1.0], axis=1) < 1e-9, 1].max())
+        whole = (tags["upper_bottom"], tags["lower_top"])
+        for sides in (whole, whole[::-1]):
+            with pytest.raises(InputError, match="is tied by matching= to several nodes: a contact"):
+                fem.contact_pair(system, *sides, matching=MORTAR)
+    assert ends[0] == pytest.approx(-1e-3, rel=1e-9) and ends[2] == pytest.approx(-1e-3, rel=1e-9)
+    assert ends[1] == pytest.approx(17.25e-3, rel=0.06) and ends[3] == pytest.approx(ends[1])
+
+
+@pytest.mark.two_ranks
+def test_unlike_sides_of_one_period(comm):
+    """Sides of one period meshed unlike: a constant and a shear that repeats itself are exact, and
+    a rotation, which does not repeat itself, is none."""
+    left = BlockMesh(lengths=(1.0, 1.0), divisions=(3, 4))
+    right = BlockMesh(lengths=(1.0, 1.0), divisions=(3, 7), corner=(1.0, 0.0))
+    mesh, tags = fem.build_mesh(Blocks({"one": left, "two": right}), comm)
+    ties = [
+        fem.Tied(tags["one_right"], tags["two_left"], matching=MORTAR),
+        fem.Tied(tags["one_left"], tags["two_right"], matching=MORTAR),
+    ]
+    shear = 1e5
+    system = fem.assemble(
+        mesh,
+        STONE,
+        tied=ties,
+        clamped=[tags["one_bottom"], tags["two_bottom"]],
+        loads=[fem.Traction(tags[f"{name}_top"], (shear, 0.0)) for name in ("one", "two")],
+    )
+    points, u = field(system, system.algebra.factor(system.K).solve(system.load(0.0)))
+    exact = np.outer(points[:, 1], [2.0 * (1.0 + NU) * shear / E, 0.0])
+    assert np.abs(u - exact).max() < 1e-12 * np.abs(exact).max()
+
+
+def test_a_tie_in_time_and_when_a_body_yields(comm):
+    """A wave crosses the tie: the ledger closes in 200 steps. The tangent of a body that yields is
+    that of the elastic one while it does not."""
+    mesh, tags, tie = stack(comm, 2, 1)
+    hit = fem.Traction(tags["upper_top"], (0.0, -1e6))
+    system = fem.assemble(mesh, STONE, tied=tie, loads=hit, clamped=tags["lower_bottom"])
+    solution = vc.simulate(
+        linear(system), scheme=vc.Newmark(), dt=1e-5, steps=200, record=[vc.Energy()]
+    )
+    assert solution.facts["energy_defect"] < 1e-11
+    strong = MohrCoulomb(E, NU, 2000.0, cohesion=1e12, phi=30.0, psi=30.0)
+    yielding = fem.assemble(mesh, strong, tied=tie, loads=hit, clamped=tags["lower_bottom"])
+    states = [vc.static_equilibrium(linear(one)) for one in (system, yielding)]
+    assert np.abs(states[1].u - states[0].u).max() < 1e-9 * np.abs(states[0].u).max()
+
+
+def test_what_cannot_be_tied_is_refused(comm):
+    """Another matching, sides that look the same way, a facet of second order that nothing covers
+    as a whole, and boundaries without a part in common."""
+    mesh, tags, tie = stack(comm, 2, 1)
+    sides = (tags["lower_top"], tags["upper_bottom"])
+    with pytest.raises(InputError, match=r"matching must be DualMortar\(\) or None, got NodeToN"):
+        fem.Tied(*sides, matching=fem.NodeToNode())
+    with pytest.raises(InputError, match=r"mesh both sides alike, or give matching=DualMortar\(\)"):
+        fem.assemble(mesh, STONE, tied=fem.Tied(*sides))
+    with pytest.raises(InputError, match="normals point the same way: choose the two boundaries"):
+        fem.assemble(
+            mesh, STONE, tied=fem.Tied(tags["lower_top"], tags["upper_top"], matching=MORTAR)
+        )
+    shifted = BlockMesh(lengths=(2.0, 1.0), divisions=(3, 2))
+    mesh, tags = fem.build_mesh(TwoBlocks(lower=shifted, upper=shifted, offset=(0.4,)), comm)
+    tie = fem.Tied(tags["lower_top"], tags["upper_bottom"], matching=MORTAR)
+    with pytest.raises(InputError, match="facets of second order are tied as a whole, so mesh"):
+        fem.assemble(mesh, STONE, tied=tie, degree=2)
+    apart = TwoBlocks(lower=shifted, upper=shifted, offset=(5.0,))
+    mesh, tags = fem.build_mesh(apart, comm)
+    for degree in (1, 2):
+        with pytest.raises(InputError, match="'upper_bottom' lies opposite|'lower_top' lies oppos"):
+            tie = fem.Tied(tags["lower_top"], tags["upper_bottom"], matching=MORTAR)
+            fem.assemble(mesh, STONE, tied=tie, degree=degree)
+
+
+@pytest.mark.serial
+def test_a_case_file_names_the_matching(tmp_path):
+    """The table of a tie says matching = {type = "DualMortar"}; another word is refused."""
+    from vi_contact.practice.studies import read_case
+
+    text = """
+    [mesh]
+    type = "TwoBlocks"
+    lower = {lengths = [2.0, 1.0], divisions = [3, 1]}
+    upper = {lengths = [2.0, 1.0], divisions = [4, 1]}
+    [material.lower]
+    E = 1e9
+    nu = 0.3
+    rho = 2000.0
+    [material.upper]
+    E = 1e9
+    nu = 0.3
+    rho = 2000.0
+    [system]
+    fixed = "lower_bottom"
+    tied = [{first = "lower_top", second = "upper_bottom", matching = {type = "WORD"}}]
+    [run]
+    dt = 1e-4
+    steps = 1
+    """
+    path = tmp_path / "tied.toml"
+    path.write_text(text.replace("WORD", "DualMortar"))
+    problem = read_case(path).problem(MPI.COMM_SELF)
+    assert len(problem.system.space.mean_nodes) == 3
+    path.write_text(text.replace("WORD", "NodeToNode"))
+    with pytest.raises(InputError, match="NodeToNode"):
+        read_case(path).problem(MPI.COMM_SELF)

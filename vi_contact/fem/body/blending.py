@@ -28,6 +28,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, Mask
+from ...core.errors import InputError
 
 APART = 1e-10  # of the size of both boundaries: less is round-off
 BETTER = 0.01  # CHOSEN: of a side; by so much more must the first be covered to follow the second
@@ -138,14 +139,21 @@ def blend(
     """
     first, second = sides
     elsewhere = np.concatenate([np.zeros(0, dtype=np.int64), *(side.numbers for side in others)])
-    ways = []
+    ways: list[tuple[TiedSide, TiedSide, Indices, Indices, Any, float]] = []
+    failure = None
     for side, other in ((second, first), (first, second)):
         partner = _find_common(side, other, elsewhere, near)
-        ways.append((side, other, partner, *matching.couple(side, other, partner)))
-        if ways[0][-1] > 1.0 - BETTER:
+        try:
+            ways.append((side, other, partner, *matching.couple(side, other, partner)))
+        except InputError as error:  # a matching may need one side that is covered as a whole
+            failure = failure or error
+        if ways and ways[0][-1] > 1.0 - BETTER:
             break
-    better = len(ways) == 2 and ways[1][-1] > ways[0][-1] + BETTER
-    side, other, partner, rows, P, _ = ways[int(better)]
+    if not ways:
+        assert failure is not None
+        raise failure
+    better = ways[-1][-1] > ways[0][-1] + BETTER
+    side, other, partner, rows, P, _ = ways[-1 if better else 0]
     d = side.points.shape[1]
 
     # nodes that move as one does: in the components that supports hold on both or on neither

@@ -120,6 +120,7 @@ class FemSpace(NodalSpace):
         tied: (owned nodes, d) mask of components that follow those of another node.
         free: (owned full,) mask of the other components.
         tied_nodes: numbers of all nodes that move together with another, on every rank.
+        mean_nodes: numbers of all nodes that follow several others, on every rank.
         tied_unknowns: mask of the free unknowns of such nodes, None without ties.
         numbers: (owned nodes, d) which unknown of all ranks a component is, also one that follows;
             -1 where held, and where it follows several others.
@@ -187,6 +188,7 @@ class FemSpace(NodalSpace):
         links = self._find_links() if tied else UNTIED
         moving = [links.followers, links.leaders, links.blends.followers]
         self.tied_nodes: Indices = np.unique(np.concatenate(moving) // self.dimension)
+        self.mean_nodes: Indices = np.unique(links.blends.followers // self.dimension)
         self._leader = links.of_nodes(self.dimension) if tied else {}
         self.tied: Mask = self._find_followers(links) if tied else np.zeros(shape, dtype=bool)
         self.free: Mask = ~(self.held | self.tied).ravel()

@@ -161,7 +161,7 @@ def _pair(
         InputError: boundaries that are not meshed alike, or share a node.
     """
     names = f"'{tie.first.name}' and '{tie.second.name}'"
-    unlike = "mesh them alike, or give matching=DualMortar()"
+    unlike = "mesh both sides alike, or give matching=DualMortar()"
     count = len(first.numbers)
     if len(second.numbers) != count or not count:
         raise InputError(
