@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 from fem_problems import field, linear
+from mpi4py import MPI
 
 import vi_contact as vc
 from vi_contact import fem
@@ -79,9 +79,7 @@ def rigid_error(system):
 def stack(comm, d, degree, *, simplices=False, deform=None, **tie):
     """Two blocks, 4 x 2 (x 2) and 6 x 3 (x 3) cells, one on the other."""
     lower, upper = (
-        BlockMesh(
-            lengths=(2.0, 1.0, 1.5)[:d], divisions=n[:d], simplices=simplices, deform=deform
-        )
+        BlockMesh(lengths=(2.0, 1.0, 1.5)[:d], divisions=n[:d], simplices=simplices, deform=deform)
         for n in ((4, 2, 2), (6, 3, 3))
     )
     mesh, tags = fem.build_mesh(TwoBlocks(lower=lower, upper=upper), comm)
@@ -229,7 +227,12 @@ def test_ties_that_cross(comm, d):
         for name, corner in corners.items()
     }
     mesh, tags = fem.build_mesh(Blocks(blocks), comm)
-    joints = [("a_right", "b_left"), ("b_top", "c_bottom"), ("c_left", "d_right"), ("d_bottom", "a_top")]
+    joints = [
+        ("a_right", "b_left"),
+        ("b_top", "c_bottom"),
+        ("c_left", "d_right"),
+        ("d_bottom", "a_top"),
+    ]
     ties = [fem.Tied(tags[one], tags[two], matching=MORTAR) for one, two in joints]
     loads = pulled(tags, d, [name for joint in joints for name in joint])
     system = fem.assemble(mesh, STONE, tied=ties, loads=loads)
@@ -322,7 +325,9 @@ def test_a_tie_beside_a_contact(comm):
             ends.append(u[np.linalg.norm(points - [2.0, 1.0], axis=1) < 1e-9, 1].max())
         whole = (tags["upper_bottom"], tags["lower_top"])
         for sides in (whole, whole[::-1]):
-            with pytest.raises(InputError, match="is tied by matching= to several nodes: a contact"):
+            with pytest.raises(
+                InputError, match="is tied by matching= to several nodes: a contact"
+            ):
                 fem.contact_pair(system, *sides, matching=MORTAR)
     assert ends[0] == pytest.approx(-1e-3, rel=1e-9) and ends[2] == pytest.approx(-1e-3, rel=1e-9)
     assert ends[1] == pytest.approx(17.25e-3, rel=0.06) and ends[3] == pytest.approx(ends[1])

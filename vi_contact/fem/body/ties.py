@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.algebra import Array, Indices
+from ...core.algebra import Indices
 from ...core.checks import describe_point
 from ...core.errors import InputError
 from ...meshes.rows import number_parts

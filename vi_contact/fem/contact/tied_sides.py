@@ -131,8 +131,8 @@ def _couple_second_order(
     # psi = A phi on each facet, and what nodes that move as another one hand to the others
     phi = products[part].sum(axis=2)
     mean = phi.sum(axis=1, keepdims=True) / phi.shape[1]
-    counts = phi > LITTLE * mean
-    D = np.where(counts, phi, mean)
+    counts: Mask = phi > LITTLE * mean
+    D: Array = np.where(counts, phi, mean)
     functions = D[:, :, None] * np.linalg.inv(products[part])
     functions, D, forces = _hand_over(functions, D, tied[facets] >= 0, counts)
 
@@ -176,8 +176,8 @@ def _hand_over(
     return kept, D * ~common, forces
 
 
-# facets (f, v) of nodes; the covered share of each (f,); ∫ phi phiᵀ (f, v, v) [m], [m²]; and pieces:
-# the facet of each (p,), nodes of side 2 (p, w) and ∫ phi_i phi_j (p, v, w)
+# facets (f, v) of nodes; the covered share of each (f,); ∫ phi phiᵀ (f, v, v) [m], [m²]; and of
+# pieces the facet of each (p,), nodes of side 2 (p, w) and ∫ phi_i phi_j (p, v, w)
 Integrals = tuple[Indices, Array, Array, tuple[Indices, Indices, Array]]
 
 
@@ -297,8 +297,6 @@ def _second_order(h: Array) -> Array:
         return np.concatenate([h * (2.0 * h - 1.0), 4.0 * h * np.roll(h, -1, axis=2)], axis=2)
     # x and y in [0, 1]: products of the three functions along both
     x, y = h[..., 1] + h[..., 2], h[..., 2] + h[..., 3]
-    along_x, along_y = (
-        _quadratics(axis.ravel()).reshape(*axis.shape, 3) for axis in (x, y)
-    )
+    along_x, along_y = (_quadratics(axis.ravel()).reshape(*axis.shape, 3) for axis in (x, y))
     places = [(0, 0), (1, 0), (1, 1), (0, 1), (2, 0), (1, 2), (2, 1), (0, 2), (2, 2)]
     return np.stack([along_x[..., i] * along_y[..., j] for i, j in places], axis=-1)
