@@ -87,6 +87,7 @@ def stack(comm, d, degree, *, simplices=False, deform=None, **tie):
     return mesh, tags, fem.Tied(*sides, matching=MORTAR, **tie)
 
 
+@pytest.mark.promise("guide/stones.md", "A constant stress passes through plane boundaries")
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("simplices", [False, True])
 @pytest.mark.parametrize("degree", [1, 2])
@@ -126,6 +127,7 @@ def test_a_constant_stress_passes_a_kink(comm, d):
     assert residual < 1e-12 and wrong < 1e-13
 
 
+@pytest.mark.promise("guide/stones.md", "Forces and moments balance to round-off")
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("d", [2, 3])
 def test_forces_and_moments_balance_on_a_curve(comm, d, degree):
