@@ -73,6 +73,13 @@ def build(comm: Any, cells: int, rule: str) -> vc.ContactProblem:
     )
 
 
+def find_profiles(surface: vc.ContactSurface, state: vc.State, order: np.ndarray) -> np.ndarray:
+    """Return openings [m] and pressures of the water [Pa] (2, m) along the base. Collective."""
+    gap = np.where(state.active, 0.0, surface.gap(state.t) - surface.normal_values(state.u))
+    pair = np.column_stack([gap, state.memory["joint_water"]])
+    return np.asarray(surface.everywhere(pair))[order].T
+
+
 def crack(comm: Any, cells: int, rule: str, t_end: float) -> dict[str, Any]:
     """Return places x (m,), times (k,), openings, water (k, m) and histories of a run."""
     problem = build(comm, cells, rule)
@@ -82,10 +89,8 @@ def crack(comm: Any, cells: int, rule: str, t_end: float) -> dict[str, Any]:
     rest = vc.static_equilibrium(problem)
     recorders = (vc.Uplift(), vc.JointEnergy(), vc.Energy())
     rows = [{name: value for r in recorders for name, value in r.start(problem, rest).items()}]
-    found: dict[str, Any] = {"t": [rest.t], "opening": [], "water": [], "worst": 0.0}
-    found["opening"].append(np.zeros(len(x)))
-    pressure = rest.memory["joint_water"]
-    found["water"].append(np.asarray(surface.everywhere(pressure))[order])
+    opening, water = find_profiles(surface, rest, order)
+    found: dict[str, Any] = {"t": [rest.t], "opening": [opening], "water": [water], "worst": 0.0}
     steps = vc.march(
         problem,
         scheme=vc.ZienkiewiczWoodTaylor(),
@@ -95,9 +100,7 @@ def crack(comm: Any, cells: int, rule: str, t_end: float) -> dict[str, Any]:
         state=rest,
     )
     for state, report in steps:
-        gap = np.where(state.active, 0.0, surface.gap(state.t) - surface.normal_values(state.u))
-        pair = np.column_stack([gap, state.memory["joint_water"]])
-        opening, water = np.asarray(surface.everywhere(pair))[order].T
+        opening, water = find_profiles(surface, state, order)
         rows.append({name: value for r in recorders for name, value in r.row(report).items()})
         found["t"].append(state.t)
         found["opening"].append(opening)

@@ -437,7 +437,7 @@ def test_what_does_not_go_with_the_water_is_refused(comm: Any) -> None:
 
 
 @pytest.mark.serial
-def test_bad_water_is_refused_in_one_sentence(comm: Any) -> None:
+def test_bad_water_is_refused_in_one_sentence(comm: Any, caplog: pytest.LogCaptureFixture) -> None:
     """By name and with a remedy."""
     wrong: list[tuple[dict[str, Any], str]] = [
         ({"speed": 0.0}, "the speed of sound"),
@@ -445,6 +445,7 @@ def test_bad_water_is_refused_in_one_sentence(comm: Any) -> None:
         ({"far_end": "rigid"}, "'open' or 'closed'"),
         ({"highest": -3.0}, "the highest frequency"),
         ({"highest": 500.0}, "give a lower highest"),
+        ({"highest": 0.1, "length": 1e5}, "has 27778 columns of cells, and 2000 is the most"),
         ({"model": "added mass", "speed": 1500.0}, "speed is for compressible water"),
         ({"model": "added mass", "length": 50.0}, "length is for"),
         ({"level": 50.0}, "above the top"),
@@ -453,6 +454,9 @@ def test_bad_water_is_refused_in_one_sentence(comm: Any) -> None:
         water = {"level": 36.0, "model": "acoustic"} | values
         with pytest.raises(InputError, match=words):
             stand(comm, *SMALL, water)
+    caplog.clear()
+    stand(comm, *SMALL, {"level": 36.0, "model": "acoustic", "highest": 9.0})  # c/4h = 10 Hz
+    assert "no mode of the water is below 9 Hz" in caplog.text
     for model in ("acoustic", "incompressible"):
         water = {"level": 36.0, "model": model, "length": 5.0}
         with pytest.raises(InputError, match="reaches 7.2 m over the water"):

@@ -11,6 +11,8 @@ import pytest
 from fem_problems import BODIES, CONCRETE, block, linear, max_over_ranks, nodal, resultant
 from mpi4py import MPI
 
+import vi_contact as vc
+from vi_contact import fem
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.system import Load
@@ -190,3 +192,29 @@ def test_nan_that_comes_with_time():
                 problem, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=1e-3, steps=9
             ):
                 pass
+
+
+def test_loads_on_facets_between_two_cells_are_refused(comm: Any) -> None:
+    """On a line that is drawn inside a body: no integral of the boundary sees it. On the same mesh
+    a load on all of the boundary is taken, on any number of ranks."""
+    import dolfinx
+
+    mesh = dolfinx.mesh.create_rectangle(comm, [[0.0, 0.0], [2.0, 1.0]], [8, 4])
+    mesh.topology.create_entities(1)
+    mesh.topology.create_connectivity(1, 2)
+    middle = dolfinx.mesh.locate_entities(mesh, 1, lambda x: np.isclose(x[0], 1.0))
+    around = fem.Facets.where("around", mesh, lambda x: np.ones(x.shape[1], dtype=bool))
+    inner = fem.Facets("inner", np.sort(middle), mesh)
+    base = fem.Facets.where("base", mesh, lambda x: np.isclose(x[1], 0.0))
+    stone = vc.LinearElastic(E=1e9, nu=0.2, rho=2000.0)
+    wet = fem.Reservoir(face=around, floor=inner, level=1.0, model="at rest")
+    for given in (
+        {"loads": fem.Pressure(inner, 1e4)},
+        {"loads": [fem.Traction(around, (0.0, 1.0)), fem.Traction(inner, (1.0, 0.0))]},
+        {"reservoir": wet},
+    ):
+        with pytest.raises(InputError, match="'inner' acts on facets between two cells"):
+            fem.assemble(mesh, stone, clamped=base, **given)
+    system = fem.assemble(mesh, stone, loads=fem.Traction(around, (0.0, 1.0)))
+    pull = comm.allreduce(system.load.at_rest(0.0) @ system.influence)
+    assert pull == pytest.approx([0.0, 6.0], rel=1e-12, abs=1e-12)

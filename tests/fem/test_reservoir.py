@@ -179,6 +179,8 @@ def test_bad_reservoirs_are_refused_in_one_sentence(comm: Any) -> None:
         ({"level": 30.0, "model": "wet"}, "'added mass' or 'incompressible' or 'acoustic'"),
         ({"level": 30.0, "tail": 31.0}, "exchange face and tail_face"),
         ({"level": 30.0, "silt": 3.0, "silt_ratio": -1.0}, "silt_ratio"),
+        ({"level": 30.0, "silt": 31.0}, "the silt at 31 m is above the level 30 m"),
+        ({"level": 30.0, "silt": -1.0}, "the silt at -1 m is below the foot of 'face'"),
     ]
     for water, words in wrong:
         with pytest.raises(InputError, match=words):
@@ -186,3 +188,34 @@ def test_bad_reservoirs_are_refused_in_one_sentence(comm: Any) -> None:
     system, base = stand(comm, size, (3, 4), None)
     with pytest.raises(InputError, match="belong together"):
         fem.Reservoir(face=base, level=30.0, tail=3.0)
+    low = fem.Facets.where("low", base.mesh, lambda x: (x[0] > 0.5 * 30.0) & (x[1] < 11.0))
+    face = fem.Facets.where("face", base.mesh, lambda x: np.isclose(x[0], 0.0))
+    stone = vc.LinearElastic(E=25e9, nu=0.2, rho=2400.0)
+    for model in ("at rest", "acoustic"):
+        wet = fem.Reservoir(face=face, level=30.0, tail_face=low, tail=12.0, model=model)
+        with pytest.raises(InputError, match="the tail water 12 m is above the top of 'low' at 10"):
+            fem.assemble(base.mesh, stone, reservoir=wet)
+
+
+@pytest.mark.serial
+def test_water_before_bodies_that_are_absent_is_refused(comm: Any) -> None:
+    """The level counts from what is there, and a face of nothing has no water."""
+    import dolfinx
+
+    mesh = dolfinx.mesh.create_rectangle(comm, [[0.0, 0.0], [2.0, 4.0]], [2, 4])
+    face = fem.Facets.where("face", mesh, lambda x: np.isclose(x[0], 0.0))
+    top = fem.Facets.where("top", mesh, lambda x: np.isclose(x[1], 4.0))
+    base = fem.Facets.where("base", mesh, lambda x: np.isclose(x[1], 0.0))
+    upper = fem.Cells.where("upper", mesh, lambda x: x[1] > 2.0 - 1e-6)
+    stone = vc.LinearElastic(E=25e9, nu=0.2, rho=2400.0)
+
+    def weigh(water: fem.Reservoir) -> float:
+        system = fem.assemble(mesh, stone, clamped=base, absent=[upper], reservoir=water)
+        return float(system.inertia(ALONG).sum())
+
+    for model in ("at rest", "added mass", "incompressible"):
+        with pytest.raises(InputError, match="the level 3 m is above the top of 'face' at 2 m"):
+            weigh(fem.Reservoir(face=face, level=3.0, model=model))
+        with pytest.raises(InputError, match="'top' is the face of bodies that are absent"):
+            weigh(fem.Reservoir(face=top, level=4.0, model=model))
+    assert weigh(fem.Reservoir(face, 2.0)) > weigh(fem.Reservoir(face, 2.0, model="at rest"))

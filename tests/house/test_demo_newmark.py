@@ -11,7 +11,15 @@ from demo_runs import demo
 
 pytest.importorskip("dolfinx")
 
-from demos.parts.problems.newmark import find_resistance, slide
+from demos.parts.problems.newmark import (
+    BASE,
+    HEIGHT,
+    ON_BASE,
+    PHI,
+    WEIGHT,
+    find_resistance,
+    slide,
+)
 
 
 def test_the_equation_by_hand() -> None:
@@ -29,8 +37,16 @@ def test_the_equation_by_hand() -> None:
 
 
 def test_the_wall_slides_where_its_forces_balance() -> None:
-    """k_y = 0 would need as much friction as thrust: between that and mu."""
-    assert 0.0 < find_resistance() < 0.5
+    """At k_y the worst of all plane wedges behind the heel, each in equilibrium with its inertia
+    and with friction on both its sides, pushes as much as the base of wall and fill can bear.
+    Wedges between 1e-4 radians of slope miss the worst by the square of that."""
+    k = find_resistance()
+    slope = np.arange(PHI, 0.5 * np.pi, 1e-4)
+    wedge = 0.5 * WEIGHT * HEIGHT**2 / np.tan(slope)
+    push = wedge * (np.sin(slope - PHI) + k * np.cos(slope - PHI)) / np.cos(slope - 2.0 * PHI)
+    thrust = push.max()
+    borne = BASE * (ON_BASE + thrust * np.sin(PHI))
+    assert k * ON_BASE + thrust * np.cos(PHI) == pytest.approx(borne, rel=1e-7)
 
 
 @pytest.mark.serial

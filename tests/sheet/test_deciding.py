@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from vi_contact.core.errors import InputError
+from vi_contact.practice.plots.charts import list_varying
 from vi_contact.practice.sheet.deciding import choose_numbers, measure_peak
 from vi_contact.practice.sheet.rules import RULES, find_columns
 from vi_contact.run.files.reading import RunFolder
@@ -123,6 +124,22 @@ def test_sections_and_plain_columns_and_space() -> None:
     ]
     in_space = made_run({f"reaction_{axis}_foot": [0.0, k, 0.0] for k, axis in enumerate("xyz", 1)})
     assert choose_numbers(in_space, None)[0].column == "reaction_y_foot"
+
+
+def test_forces_of_water_are_no_open_shares() -> None:
+    """Columns of Uplift begin as the open share of a part does: they decide nothing, and the report
+    charts and tells them by their own names."""
+    water = {"uplift_force": [5e6, 6e6, 5e6], "uplift_effective": [8e6, 7e6, 8e6]}
+    whole = {name: WALL[name] for name in WALL if name.startswith("contact_")}
+    for columns in (WALL, whole):
+        plain, wet = (
+            [(number.column, number.value) for number in choose_numbers(made_run(given), None)]
+            for given in (columns, columns | water)
+        )
+        assert wet == plain
+    run = made_run(WALL | water)
+    assert set(list_varying(run, "uplift_")) == {"uplift_base", "uplift_stem"}
+    assert list_varying(run, "uplift_force") == ["uplift_force"]
 
 
 def test_a_level_base_has_a_shear_and_no_thrust() -> None:

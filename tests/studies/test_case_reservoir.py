@@ -15,6 +15,7 @@ from mpi4py import MPI
 from vi_contact.core.errors import InputError
 from vi_contact.core.units import STANDARD_GRAVITY as G
 from vi_contact.practice.studies.cases.case import read_case
+from vi_contact.practice.studies.cases.description.doubts import find_warnings
 from vi_contact.practice.studies.cases.description.model import describe
 from vi_contact.practice.studies.cases.description.tables import input_tables, print_tables
 from vi_contact.practice.units.report_units import ReportUnits
@@ -104,6 +105,20 @@ def test_a_reservoir_is_a_table_and_its_loads_are_told(tmp_path: Path) -> None:
         assert row in rows
     assert "base: water: toe (6, 0) m" in rows and "base: water: quake none" in rows
     assert max(len(line) for line in text.splitlines()) < 200
+
+
+def test_unlike_levels_of_reservoir_and_joint_are_doubted(tmp_path: Path) -> None:
+    """A level that one table alone has is told, with both heights."""
+    joined = DAM.replace('drain = "1 m"', 'drain = "1 m"\ntail = "2 m"')
+    lower = joined.replace('level = "9 m"\nmodel', 'level = "8 m"\nmodel')
+    for text, words in (
+        (joined, []),
+        (DAM, ["the tail water stands at 2 m in [reservoir] and at no height in the joint 'base'"]),
+        (lower, ["the water stands at 8 m in [reservoir] and at 9 m in the joint 'base'"]),
+    ):
+        model, _ = described(write(tmp_path, text))
+        said = [one.partition(":")[0] for one in find_warnings(model) if "[reservoir]" in one]
+        assert said == words
 
 
 def test_a_stage_has_its_own_level(shared_tmp: Path) -> None:

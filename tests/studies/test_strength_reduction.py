@@ -107,3 +107,12 @@ def test_the_command(
     assert "the body stands with its strength over 1.35" in capsys.readouterr().out
     assert table.read_text().startswith("factor,displacement_m,certificate,reason\n")
     assert (tmp_path / "slope.png").exists()
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("name", ["start", "tolerance", "certificate"])
+def test_numbers_that_are_not_above_zero_are_refused(comm: Any, name: str) -> None:
+    """By the name of the function that was called."""
+    for value in (0.0, -1.0, np.nan, "1"):
+        with pytest.raises(InputError, match=f"^strength_reduction: {name} is "):
+            studies.strength_reduction(None, **{name: value})

@@ -272,9 +272,18 @@ class NonlinearForces:
         """Return what is left of the forces at an increment (n,): b - A d of a linear body."""
         return find_rest(self.system, self.stage, d)[0]
 
+    def find_internal(self, d: Array) -> Array:
+        """Return the internal force (n,) at an increment (n,), in the unit of b."""
+        return self.stage.scale * self.stage.find_internal(self.system, d)
+
     def find_start(self) -> Array | None:
         """Return the increment (n,) at which passes begin; None for zero."""
         return self.stage.find_start(self.system)
+
+    def find_old(self) -> Array:
+        """Return the increment (n,) of the displacement before, of a body that turns."""
+        assert self.stage.between is not None  # asked for of such bodies alone
+        return self.stage.between - self.stage.guess
 
     def find_tangent(self, d: Array, *, whole: bool = False) -> Matrix:
         """Return p'(u) (n, n) [N/m] at an increment.

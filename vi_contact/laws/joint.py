@@ -262,6 +262,10 @@ class Joint(OfPoints):
         else:
             before = self._mean_left(kappa, turn, dc)
             whole = self._mean_left(kappa, last, dc)
+        if self.softening == "constant":
+            # Slip may take kappa past dc, where the tension would jump within a step, which then
+            # has no answer: it is lost in the mean of the step, as the cohesion is.
+            on_law = whole
         secant = np.divide(before, opened, out=np.zeros(count), where=opened > 0.0)
         return _Walk(dc, last, secant, on_law, whole)
 

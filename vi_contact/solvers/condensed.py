@@ -19,7 +19,7 @@ points are kept too: ``friction.condensed``.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -260,6 +260,7 @@ class PreparedCondensed:
         """Return passes on normal unknowns or, with friction, on normal and tangential ones."""
         surface = self._surface
         springs = surface.everywhere(surface.compliance) / self._scale
+        bilateral = surface.everywhere(surface.bilateral)
         if frictional and surface.total:
             friction = self.friction
             G: Any = friction.delassus
@@ -269,13 +270,20 @@ class PreparedCondensed:
             compliance = np.zeros(len(G))
             compliance[:: len(compliance) // surface.total] = springs
 
-            def rub(step: StepProblem, free: Array, near: Array | None) -> Any:
-                """Solve the small problem with friction."""
-                answer, held, values = friction.reactions(step, free, self._rigid, near)
+            def rub(
+                step: StepProblem, free: Array, near: Array | None, G: Array = G, small: Any = None
+            ) -> Any:
+                """Solve the small problem with friction, of this flexibility or another."""
+                answer, held, values = friction.reactions(step, free, self._rigid, near, small)
                 q = values.reshape(answer.r.shape) - free.reshape(answer.r.shape)
                 moved = q + (G @ answer.r.ravel()).reshape(q.shape)
                 found = (answer.r, moved, answer.active, answer.stick, held, values)
                 return (*found, answer.iterations)
+
+            def prepare_rub(G: Array) -> Any:
+                """Return ``rub`` of another flexibility."""
+                other = self._settings.friction_method.prepare(G, bilateral)
+                return partial(rub, G=G, small=other)
 
             return CondensedPasses(
                 friction.condensed,
@@ -285,12 +293,15 @@ class PreparedCondensed:
                 surface,
                 self._rigid,
                 f"condensed {type(self._settings.friction_method).__name__}",
+                prepare=prepare_rub,
             )
         condensed, small = self._condense_normal()
         G = condensed.flexibility
 
-        def press(step: StepProblem, free: Array, near: Array | None) -> Any:
-            """Solve the small problem without friction."""
+        def press(
+            step: StepProblem, free: Array, near: Array | None, G: Array = G, small: Any = small
+        ) -> Any:
+            """Solve the small problem without friction, of this flexibility or another."""
             bound = surface.everywhere(step.bound)
             guess = surface.everywhere(step.active) if near is None else near[:, 0] > 0.0
             answer: LCPResult = small.solve(bound - free, guess)
@@ -299,7 +310,20 @@ class PreparedCondensed:
             closed = answer.active
             return answer.r[:, None], moved, closed, closed, held, bound, answer.iterations
 
-        return CondensedPasses(condensed, press, G, springs, surface, self._rigid, self._name)
+        def prepare_press(G: Array) -> Any:
+            """Return ``press`` of another flexibility."""
+            return partial(press, G=G, small=self._settings.method.prepare(G, bilateral))
+
+        return CondensedPasses(
+            condensed,
+            press,
+            G,
+            springs,
+            surface,
+            self._rigid,
+            self._name,
+            prepare=prepare_press,
+        )
 
     def solve_many(self, many: StepProblem, own: Callable[[int], StepProblem]) -> Answers | None:
         """Return the answers to several steps of this A, which reads its factor once for all.

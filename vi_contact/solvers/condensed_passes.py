@@ -85,6 +85,8 @@ class CondensedPasses:
         surface: ContactSurface,
         rigid: Mask,
         name: str,
+        *,
+        prepare: Callable[[Array], Callable[[StepProblem, Array, Array | None], Any]],
     ) -> None:
         """Hold A condensed.
 
@@ -97,8 +99,10 @@ class CondensedPasses:
             surface: the contact conditions.
             rigid: (M,) which supports are.
             name: of the method.
+            prepare: makes what ``small`` is for another flexibility.
         """
         self._condensed = condensed
+        self._prepare = prepare
         self._small = small
         self.flexibility = flexibility
         self._compliance = compliance
@@ -106,7 +110,8 @@ class CondensedPasses:
         self._rigid = rigid
         self._name = name
         self.width = len(compliance) // max(surface.total, 1)
-        self._free = np.zeros(0)
+        self._free = self._b = np.zeros(0)
+        self._is_spent = False
 
     @cached_property
     def stiffness(self) -> Array | None:
@@ -119,7 +124,9 @@ class CondensedPasses:
 
     def begin(self, base: StepProblem) -> None:
         """Find the free motion of a step. Collective."""
+        self._b = base.b
         self._free = self._condensed.find_free_motion(base.b)
+        self._is_spent = False
 
     def make(self, step: StepProblem, push: Array, before: PassEnd | None = None) -> PassEnd:
         """Return where a step leads whose loads are those of the base and a push. Collective.
@@ -134,6 +141,42 @@ class CondensedPasses:
         r, moved, closed, sticks, held, values, iterations = self._small(step, free, near)
         slip = np.where(sticks[:, None], 0.0, -moved[:, 1:])
         return PassEnd(moved[:, 0], slip, r, closed, sticks, held, values, iterations)
+
+    def make_sprung(
+        self, step: StepProblem, push: Array, opened: Array, springs: Array
+    ) -> Expected | None:
+        """Return where a step leads whose tension follows the opening on springs. Collective.
+
+        The push has the tension at some openings g, which is F + S (gap - g) at others. With
+        H = G⁻¹ and the free gaps q of the push
+
+            (H + S) moved = H q + S g + r,
+
+        which is a small problem with the flexibility (H + S)⁻¹. None where H + S is not positive.
+
+        Args:
+            step: with its own bound and friction.
+            push: the further forces (M d,) at contact unknowns, ``scale`` times newtons.
+            opened: g (M,) [m].
+            springs: S (M,), ``scale`` times N/m.
+        """
+        assert self.stiffness is not None  # whoever asks has looked
+        matrix = self.stiffness.copy()
+        normal = np.arange(len(opened)) * self.width
+        matrix[normal, normal] += springs
+        factor, info = lapack.dpotrf(matrix, lower=1)
+        if info:
+            return None
+        inverse, _ = lapack.dpotri(factor, lower=1)
+        flexibility = np.tril(inverse) + np.tril(inverse, -1).T
+
+        # The springs pull from where they are without reactions.
+        values = self._read_values(step).ravel()
+        q = values - self._move(push)
+        q = q + flexibility[:, normal] @ (springs * (opened - q[normal]))
+        _, moved, closed, sticks, *_ = self._prepare(flexibility)(step, values - q, None)
+        gap = np.where(closed, 0.0, np.maximum(moved[:, 0], 0.0))
+        return Expected(gap, np.where(sticks[:, None], 0.0, -moved[:, 1:]), closed, sticks)
 
     def _move(self, push: Array) -> Array:
         """Return the contact unknowns (M d,) [m] without reactions, under a further push."""
@@ -150,10 +193,7 @@ class CondensedPasses:
             expected: where the step ends.
         """
         assert self.stiffness is not None  # whoever asks has looked
-        columns = [step.bound[:, None]]
-        if step.slip0 is not None:
-            columns.append(step.slip0)
-        values = np.asarray(self.surface.everywhere(np.hstack(columns)))
+        values = self._read_values(step)
 
         # The reactions move the contact unknowns from where they would be without any.
         moved = np.column_stack([expected.gap, -expected.slip])
@@ -161,14 +201,25 @@ class CondensedPasses:
         r = (self.stiffness @ (moved - q).ravel()).reshape(values.shape)
         held = np.zeros(values.size, dtype=bool)
         places = (expected.gap, expected.slip, r, expected.closed, expected.sticks)
-        return PassEnd(*places, held, values.ravel(), 0)
+        return PassEnd(*places, held, (values - moved).ravel(), 0)
 
-    def settle(self, step: StepProblem, end: PassEnd) -> tuple[PassEnd, float]:
+    def _read_values(self, step: StepProblem) -> Array:
+        """Return bounds and slips before (M, d) [m] of all conditions. Collective."""
+        columns = [step.bound[:, None]]
+        if step.slip0 is not None:
+            columns.append(step.slip0)
+        return np.asarray(self.surface.everywhere(np.hstack(columns)))
+
+    def settle(
+        self, step: StepProblem, end: PassEnd, *, force: float = 0.0
+    ) -> tuple[PassEnd, float]:
         """Return an end with its reactions put onto their conditions, and by how much. Collective.
 
         Args:
             step: with its own bound and friction.
             end: what ``balance`` has returned.
+            force: of a joint whose tension is on springs, ``scale`` times newtons. Reactions may be
+                rounding beside it, and open points are held where they are expected.
 
         Returns:
             The end, and the largest change of a reaction over the largest reaction.
@@ -185,11 +236,14 @@ class CondensedPasses:
             e = np.divide(end.slip, way[:, None], out=np.zeros(end.slip.shape), where=goes[:, None])
             beyond = np.where(goes, 0.0, np.linalg.norm(r[:, 1:], axis=1) - limit)
             r[:, 1:] = np.where(goes[:, None], limit[:, None] * e, r[:, 1:])
-        size = max_abs(end.r)
+        size = max(max_abs(end.r), force)
         missing = max(max_abs(r - end.r), beyond.max(initial=0.0)) / (size or 1.0)
         held = np.repeat(end.sticks[:, None], self.width, axis=1)
         held[:, 0] = (r[:, 0] != 0.0) & self._rigid
         held &= bool(r.any())
+        if force > 0.0:
+            # A tension on a steep line feels the rounding of an opening: it stays as expected.
+            held[:, 0] |= ~end.closed & self._rigid
         return replace(end, r=r, held=held.ravel()), float(missing)
 
     def _find_limit(self, step: StepProblem, r_n: Array) -> Array:

@@ -69,14 +69,14 @@ def _refuse(step: StepProblem, source: Source | None) -> None:
         cause = ""
         if name == "load" and source is not None:
             cause = _name_history(step, source())
-        place = _describe_place(surface.comm, wrong, points)
+        place = describe_place(surface.comm, wrong, points)
         raise StepFailure(
             f"the {name} of step {step.k} at t = {step.t:.6g} s contains NaN or infinite values"
             f"{place}{cause}: {remedy}"
         )
 
 
-def _describe_place(comm: Any, wrong: Mask, points: Array | None) -> str:
+def describe_place(comm: Any, wrong: Mask, points: Array | None) -> str:
     """Return " at" and where the first wrong row of all ranks is, or " everywhere". Collective.
 
     Args:
@@ -137,7 +137,7 @@ def refuse_matrix(problem: ContactProblem, A: EffectiveMatrix) -> None:
         if matrix is not None and largest(comm, not isfinite(max_abs(matrix @ ones))):
             names.append(name)
     whose = f" ({' and '.join(names)})" if names else ""
-    place = _describe_place(comm, wrong, None if A.space is None else A.space.coordinates)
+    place = describe_place(comm, wrong, None if A.space is None else A.space.coordinates)
     raise InputError(
         f"the matrix of the steps{whose} has NaN or infinite entries{place}: check materials, "
         "masses, damping, contact directions and the time step"

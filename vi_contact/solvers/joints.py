@@ -8,6 +8,11 @@ the same ones; where it meets all conditions it has the answer, as it mostly doe
 is made. Where a pass is no better than the best one, a part of Newton's step is gone. A joint that
 holds everywhere needs no pass.
 
+A point that has opened by very little closes on a steep line, F(kappa) g/kappa. There a constant
+strength moves a point much further than the law would, and passes may go to and fro for good. After
+``MOST`` of them the tension follows the opening *inside* a pass, as a spring of the law's slope
+(``CondensedPasses.make_sprung``), which a few passes settle.
+
 Where Newton's matrix is not positive, the joint loses more than the bodies give way: the step has
 several answers (*snap-back*). The next pass then takes the strengths of the answer as they are,
 which goes on from the strength before the step, and the log says so.
@@ -41,6 +46,8 @@ MOST = 100  # passes of a step
 FASTER = 0.1  # of what was missed before: Newton's method goes on with the sets that it has
 # of the largest reaction: what an end misses that is near enough to be the one that passes lead to
 CLOSE = 1e-3
+SPRUNG = 200  # passes of a step on springs
+SHARE = 0.1  # the least part of a pass on springs that is gone
 AIM = 0.1  # of the tolerance: what passes on the contact unknowns come to
 WATER = 400  # times that water follows what a static stage has opened
 ADVICE = "try a smaller dt, or a joint that loses its strength over a longer way"
@@ -73,7 +80,7 @@ class JointSolver:
         self._solve = solve
         self._make_passes = getattr(prepared, "make_passes", None)
         self._tolerance = tolerance
-        self._advice = advice
+        self._advice = advice if self._make_passes else f"give solver=Condensed(), or {advice}"
         self.passes: list[int] = []
         self.snapped = 0
         self._rates: RatePasses | None = None
@@ -229,6 +236,9 @@ class JointSolver:
                 self.passes.append(count)
                 return step, answer
             used = step.joint.used
+        found = self._solve_sprung(base, joint, small)
+        if found is not None:
+            return found
         # Passes by whole steps take another way, and ask methods that were named to escalate to.
         return self._solve_whole(base, joint, joint.guess(base))
 
@@ -268,6 +278,8 @@ class JointSolver:
         small: CondensedPasses,
         expected: Expected,
         count: int,
+        *,
+        force: float = 0.0,
     ) -> tuple[StepProblem, Certified | None]:
         """Repeat Newton's method from where it leads, while the sets stay. Collective.
 
@@ -280,6 +292,7 @@ class JointSolver:
             small: makes the passes.
             expected: the end of the step after the last pass.
             count: how many passes there were.
+            force: beside which reactions may be rounding, ``scale`` times newtons.
 
         Returns:
             The step with the last strength, and its certified answer; None: it has none.
@@ -293,7 +306,7 @@ class JointSolver:
             step = joint.apply(base, used)
             push = find_push(step, small.width)
             there = small.balance(step, push, expected)
-            end, missing = small.settle(step, there)
+            end, missing = small.settle(step, there, force=force)
             if missing <= AIM * self._tolerance:
                 answer = _certify(step, small, push, end, count)
                 return step, answer if answer.worst <= self._tolerance else None
@@ -304,6 +317,64 @@ class JointSolver:
             if further is None:
                 return step, None
             expected = further
+
+    def _solve_sprung(
+        self, base: StepProblem, joint: JointStep, small: CondensedPasses
+    ) -> tuple[StepProblem, Certified] | None:
+        """Return the answer by passes whose tension is on springs; None: there is none. Collective.
+
+        They begin at the state before the step. Each has the law as a line about an expected end,
+        and its own end is the next one. The limit of friction is that of the expected end.
+
+        Args:
+            base: the step without its joint.
+            joint: at the beginning.
+            small: makes the passes.
+        """
+        surface = base.surface
+        gap = np.asarray(surface.everywhere(joint.g0))
+        slip = np.zeros((len(gap), small.width - 1))
+        least = np.inf
+        part = 1.0  # of a pass that is gone
+        for count in range(1, SPRUNG + 1):
+            g1 = surface.mine(gap)
+            s1 = joint.s0 + surface.mine(slip)
+            used = joint.ask(g1, s1)
+            step = joint.apply(base, used)
+            slope = np.asarray(surface.everywhere(joint.find_slope(g1, s1).tension))
+            # A closed point loses nothing until it opens.
+            springs = step.scale * np.where(gap > 0.0, slope, np.maximum(slope, 0.0))
+            push = find_push(step, small.width)
+            try:
+                expected = small.make_sprung(step, push, gap, springs)
+                if expected is None:
+                    # A snap-back: what is lost is lost between passes, which lead away from where
+                    # the step began, so that they miss more before they miss less.
+                    least = np.inf
+                    springs = np.maximum(springs, 0.0)
+                    expected = small.make_sprung(step, push, gap, springs)
+            except StepFailure:
+                return None
+            if expected is None:
+                return None
+
+            # What its end misses: the tension of the law there against that of the line, and the
+            # limits of friction at both ends.
+            line = used.tension + surface.mine(springs * (expected.gap - gap)) / step.scale
+            there = joint.ask(surface.mine(expected.gap), joint.s0 + surface.mine(expected.slip))
+            limit = used.cohesion - used.mu * used.tension
+            friction = np.abs(there.cohesion - there.mu * there.tension - limit)
+            force = max_abs(step.b) / step.scale
+            lag = compare(surface, there, used._replace(tension=line), friction, limit, force)
+            step, answer = self._follow(base, joint, small, expected, count, force=max_abs(push))
+            if answer is not None:
+                self.passes.append(MOST + count)
+                return step, answer
+            part = min(1.0, 2.0 * part) if lag < least else max(0.5 * part, SHARE)
+            least = min(least, lag)
+            gap = gap + part * (expected.gap - gap)
+            slip = slip + part * (expected.slip - slip)
+        return None
 
     def _finish(
         self, step: StepProblem, small: CondensedPasses, push: Array, end: PassEnd, count: int

@@ -38,7 +38,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.algebra import Array, EffectiveMatrix, Mask, Matrix, largest
+from ..core.algebra import Array, EffectiveMatrix, Mask, Matrix, largest, max_abs
 from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
 from ..core.sizes import OWN_CONDITIONS
@@ -49,6 +49,7 @@ from .acceleration import Anderson
 from .automatic import Automatic
 from .certified import ADVICE, NEAR, CertifiedSolver
 from .condensed import Condensed
+from .door import describe_place
 from .line_search import FLAT, find_finite, find_flat
 from .normal.lemke import Lemke
 from .passes import Certified, Passes, certify, pose_about
@@ -67,6 +68,7 @@ MARGIN = 4.0  # passes that a tangent needs itself
 SHARES = (0.0, 0.0, 0.1, 0.4)
 FAR = 1e3  # times the increment so far: a pass that adds so much is by a tangent that is singular
 TURNED = 0.5  # half the angle of a step that is too long for anything else
+STARTS = (1.0, 0.5, 0.25, 0.0)  # shares of the way of a turning body that are tried in turn
 BRACE = 10.0  # of the stiffness of a closed point: that of a spring which braces a tangent there
 
 
@@ -216,12 +218,39 @@ class NonlinearSolver:
         if best is not None and is_certified:
             log.debug("%s: %d linear steps, %s", _name(step), passes.count, best.certificate)
             return replace(best, result=replace(best.result, iterations=passes.count))
+        if walk.forces.turns:
+            self._refuse_turning(step, best)
         reached = "" if best is None else f" ({best.certificate})"
         if walk.care:
             reached += "; its tangent is not positive there, as that of a body that gives way"
         raise StepFailure(
             f"{_name(step)} did not come below the certificate tolerance {self._tolerance:g} in "
             f"{MOST} linear steps{reached}: {self._advice}"
+        )
+
+    def _refuse_turning(self, step: StepProblem, best: Pass | None) -> None:
+        """Raise StepFailure for a step of a body that turns. Collective.
+
+        Args:
+            step: the step.
+            best: its best pass; None where none has led anywhere.
+        """
+        place = ""
+        if best is not None:
+            result = best.result
+            surface = self._problem.surface
+            load = surface.reaction_load(result.r_n, len(result.x), result.r_t)
+            left = np.abs(best.place.rest - load)
+            left[~np.isfinite(left)] = np.inf  # as of cells that are inside out
+            wrong = left == largest(surface.comm, max_abs(left))
+            points = self._problem.system.space.coordinates
+            place = describe_place(surface.comm, wrong, points)
+            place = f"; the forces are the farthest from balance{place} of the undeformed body"
+        raise StepFailure(
+            f"{_name(step)} did not come below the certificate tolerance {self._tolerance:g}, as "
+            f"where a step is so long that what lands crushes the cells behind it{place}: give "
+            "the run dt=HalvedAtImpact(dt, halvings=6), which makes such a step in parts, or a "
+            "smaller dt"
         )
 
     def _begin(self, step: StepProblem) -> Walk:
@@ -232,19 +261,39 @@ class NonlinearSolver:
         """
         forces = step.forces
         assert isinstance(forces, NonlinearForces)  # linear bodies have no walk
-        if step.internal is not None and not self._is_finite(step.internal):
+        d = forces.find_start()
+        if d is not None:
+            start = self._find_upright(step, forces, d)
+        elif step.internal is not None and not self._is_finite(step.internal):
             raise StepFailure(
                 f"{_name(step)} begins where its internal force is NaN or infinite: {self._advice}"
             )
-        d = forces.find_start()
-        start = Place(step.guess, step.b, step.active)
-        if d is not None:
-            start = Place(d, forces.find_rest(d), step.active)
+        else:
+            start = Place(step.guess, step.b, step.active)
         walk = Walk(step, forces, start, start, self._reference, self._make_acceleration())
         # The reference of a body that has turned is of no use: its passes go with a tangent, in
         # static stages too.
         walk.tangent_due = forces.may_have_turned
         return walk
+
+    def _find_upright(self, step: StepProblem, forces: NonlinearForces, d: Array) -> Place:
+        """Return where passes of a body that turns begin. Collective.
+
+        A stop in a step leaves velocities that would turn cells inside out on their way on. Then a
+        part of the way is gone from the displacement before, where no cell is inside out.
+
+        Args:
+            step: the step.
+            forces: of the step.
+            d: the increment (n,) at the end of the way.
+        """
+        old = forces.find_old()
+        for part in STARTS:
+            start = old + part * (d - old) if part < 1.0 else d
+            rest = forces.find_rest(start)
+            if self._is_finite(rest):
+                break
+        return Place(start, rest, step.active)
 
     def _go(self, walk: Walk, passes: Passes[Pass]) -> Iterator[Pass]:
         """Yield passes, each from where the ones before point to. Collective.
@@ -375,6 +424,10 @@ class NonlinearSolver:
         d = add_increment(walk.here.d, whole.bound, whole.slip0, posed, result)
         rest = walk.forces.find_rest(d)
         answer = replace(result, x=d)
+        if walk.forces.turns:
+            # Forces of the guess, a straight way, may be a thousand times those of the answer.
+            internal = walk.forces.find_internal(d)
+            whole = replace(whole, b=rest + internal, internal=internal)
         certificate = kkt_residual(whole, answer, rest)
         return Pass(answer, certificate, walk.escalated, Place(d, rest, result.active))
 
@@ -451,6 +504,8 @@ class NonlinearSolver:
             self._refuse_tangent(walk)  # it is not positive, as it leads up
             place = start
         if place is None:
+            if walk.forces.turns:
+                self._refuse_turning(walk.whole, there)
             raise StepFailure(
                 f"{_name(walk.whole)}: no part of a linear step leads to less energy: "
                 f"{self._advice}"

@@ -21,12 +21,11 @@ def plot_openings(run: Mapping[str, Any], path: str | Path) -> Path:
     figure, axes = canvas(1, 2, (12.0, 4.6), sharey=True)
     opened, pressed = np.ravel(axes)
     parts = (
-        (opened, 1e3 * run["opening"], "opening [mm]"),
+        (opened, np.ma.masked_less_equal(1e3 * run["opening"], 0.0), "opening [mm]"),
         (pressed, run["water"] / 1e3, "water pressure [kPa]"),
     )
-    for axis, values, label in parts:
+    for axis, shown, label in parts:
         axis.grid(False)
-        shown = np.ma.masked_less_equal(values, 0.0)
         drawn = axis.pcolormesh(
             run["x"], run["t"], shown, cmap="viridis_r", shading="nearest", vmin=0.0
         )

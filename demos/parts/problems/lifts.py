@@ -120,17 +120,19 @@ def backfill(comm: MPI.Comm, name: str, lifts: int, fill: Any, size: float) -> B
         worst = max(worst, state.certificate or 0.0)
         rows.append(stem.start(problem, state))
 
-    # pressures on the back of the stem, of this rank: the figure is of one rank
+    # pressures on the back of the stem, of all ranks
     surface = problem.surface
-    on_stem = (np.abs(surface.points[:, 0] - FOOT[0]) < 1e-6) & (surface.points[:, 1] > FOOT[1])
+    points = np.asarray(surface.everywhere(surface.points))
+    pressures = np.asarray(surface.everywhere(state.r_n / surface.weights))
+    on_stem = (np.abs(points[:, 0] - FOOT[0]) < 1e-6 * HEIGHT) & (points[:, 1] > FOOT[1])
     return Backfilled(
         name=name,
         size=size,
         heights=HEIGHT / lifts * np.arange(1, lifts + 1),
         thrusts=np.array([row["N_stem"] for row in rows]),
         moments=np.array([row["M_stem"] for row in rows]),
-        points=surface.points[on_stem, 1] - FOOT[1],
-        pressures=(state.r_n / surface.weights)[on_stem],
+        points=points[on_stem, 1] - FOOT[1],
+        pressures=pressures[on_stem],
         certificate=worst,
     )
 

@@ -48,27 +48,50 @@ def find_absent(mesh: Any, absent: Any) -> Mask:
     return missing
 
 
-def refuse_covered(mesh: Any, loads: Sequence[Any]) -> None:
-    """Raise InputError for loads on facets that a later body covers. Collective.
+def refuse_inner(mesh: Any, loads: Sequence[Any]) -> None:
+    """Raise InputError for loads on facets between two cells. Collective.
 
-    Integrals over facets are of the boundary of the whole mesh. A load on a facet between two
-    cells, such as the floor of a pit that is not yet dug, would be left out without a word.
+    Integrals over facets are of the boundary of the whole mesh. A load on a line that is drawn
+    inside a body, or on the floor of a pit that is not yet dug, would be left out without a word.
 
     Args:
         mesh: of the body.
         loads: of ``fem.assemble``.
     """
+    if not any(isinstance(getattr(load, "facets", None), Facets) for load in loads):
+        return
     outer = Facets.where("", mesh, lambda x: np.ones(x.shape[1], dtype=bool))
+    dim = mesh.topology.dim - 1
     defects = []
     for load in loads:
         facets = getattr(load, "facets", None)
-        if isinstance(facets, Facets) and not np.isin(facets.indices, outer.indices).all():
+        if not isinstance(facets, Facets) or facets.mesh is not mesh:
+            continue  # refused elsewhere, or no load on facets
+        owned = facets.indices[facets.indices < mesh.topology.index_map(dim).size_local]
+        if not np.isin(owned, outer.indices).all():
             defects.append(
                 f"assemble: the load on '{facets.name}' acts on facets between two cells of the "
-                "mesh, where it is not seen: draw the body that covers them with points of its "
-                "own, or load a thin layer by BodyForce"
+                "mesh, where it is not seen: give facets of the outer boundary, draw the body that "
+                "covers them with points of its own, or load a thin layer by BodyForce"
             )
     refuse(defects, MpiComm(mesh.comm))
+
+
+def find_present(mesh: Any, absent: Mask | None, facets: Facets) -> Mask:
+    """Return which facets (k,) have a present cell on this rank.
+
+    Args:
+        mesh: of the body.
+        absent: which local cells are absent, or None where all are there for good.
+        facets: a group of its boundary.
+    """
+    if absent is None:
+        return np.ones(len(facets.indices), dtype=bool)
+    dim = mesh.topology.dim
+    mesh.topology.create_connectivity(dim - 1, dim)
+    beside = mesh.topology.connectivity(dim - 1, dim)
+    there = [not absent[beside.links(facet)].all() for facet in facets.indices]
+    return np.array(there, dtype=bool)
 
 
 def let_remember(material: Any, forms: Any) -> Any:

@@ -120,8 +120,7 @@ def find_water(x: Array, y: Array, side: float, data: WaterData) -> WaterEquatio
     highest = data.highest
 
     # Columns of nodes: those of the face, moved away, until the far end stands upright.
-    widest = min(CELLS * depth, data.speed / (CELLS_OF_WAVE * highest))
-    cells = max(1, int(np.ceil(data.length / widest)))
+    cells = count_columns(depth, data.length, highest, data.speed)
     far = x[0] + side * data.length
     columns = x[None, :] + np.linspace(0.0, 1.0, cells + 1)[:, None] * (far - x)[None, :]
     heights = np.broadcast_to(y, columns.shape)
@@ -170,6 +169,19 @@ def find_water(x: Array, y: Array, side: float, data: WaterData) -> WaterEquatio
         modes=modes,
         at_end=at_end,
     )
+
+
+def count_columns(depth: float, length: float, highest: float, speed: float) -> int:
+    """Return how many columns of cells the water has.
+
+    Args:
+        depth: of the water [m].
+        length: distance of the far end [m].
+        highest: frequency of the last mode [Hz].
+        speed: c [m/s].
+    """
+    widest = min(CELLS * depth, speed / (CELLS_OF_WAVE * highest))
+    return max(1, int(np.ceil(length / widest)))
 
 
 def count_modes(area: float, highest: float, speed: float) -> float:

@@ -41,7 +41,7 @@ from ..matrices.petsc_rows import transfer
 from ..mesh.communicators import MpiComm, give_back
 from ..mesh.numbering import number_nodes
 from ..mesh.tagged_mesh import Cells, Facets
-from .absent import find_absent, hold_absent, let_remember, refuse_covered
+from .absent import find_absent, hold_absent, let_remember, refuse_inner
 from .assembly_checks import (
     check_body,
     check_initial,
@@ -189,8 +189,8 @@ def assemble(
     # what is given: kinds, groups, conditions that go together
     bcs = as_tuple(bcs)
     refuse_uneven(comm, bcs)
-    if missing is not None:
-        refuse_covered(mesh, as_tuple(loads))
+    pressures = list_pressures(reservoir)
+    refuse_inner(mesh, (*as_tuple(loads), *pressures))
     if bcs or space is not None:
         space, degree = choose_space(mesh, space, bcs)
     section, damping = check_body(
@@ -212,7 +212,7 @@ def assemble(
         prescribed=prescribed,
         tied=tied,
         dashpots=dashpots,
-        loads=(*as_tuple(loads), *list_pressures(reservoir)),
+        loads=(*as_tuple(loads), *pressures),
     )
 
     space = _number_unknowns(

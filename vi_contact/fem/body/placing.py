@@ -39,7 +39,8 @@ def place(
     """Return the problem with other bodies, and where its static stage begins. Collective.
 
     Both problems are of ``fem.assemble`` with ``absent=`` on one mesh, with the same materials in
-    the same order. Hand both results to ``static_equilibrium(problem, state=)``.
+    the same order. Hand both results to ``static_equilibrium(problem, state=)``. The unknowns of
+    ``problem`` remember where its held nodes stand from now on, so assemble one for each placing.
 
     Args:
         before: the problem of the stage before.

@@ -18,6 +18,7 @@ ground is a load -(M + M_w) r, a vertical one -M r, and so is the weight. Dampin
 not count M_w.
 """
 
+import logging
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -33,12 +34,15 @@ from ...core.units import STANDARD_GRAVITY, WATER_WEIGHT
 from .. import compat
 from ..mesh.group_checks import facets_of
 from ..mesh.tagged_mesh import Facets
-from .acoustic_water import OVERTONES, WaterData, count_modes
+from .absent import find_present
+from .acoustic_water import OVERTONES, WaterData, count_columns, count_modes
 from .loads import Pressure
 from .space import FemSpace
 from .water_pressure import find_compliance
 from .water_unknowns import AcousticWater
 from .wet_face import ALIKE, WetFace
+
+log = logging.getLogger(__name__)
 
 MODELS = ("added mass", "incompressible", "acoustic", "at rest")
 FAR_ENDS = ("open", "closed")
@@ -46,6 +50,7 @@ WESTERGAARD = 0.875
 QUADRATURE = 8  # degree, for the root of the depth
 FAR = 5.0  # of the depth: distance of the far end
 MOST_MODES = 1000  # unknowns whose mass matrix is dense
+MOST_COLUMNS = 2000  # of cells, each with an outlet on the bottom: as many unknowns
 SPEED_OF_SOUND = 1440.0  # of water [m/s]
 OF_ACOUSTIC = {"speed": SPEED_OF_SOUND, "reflection": 1.0, "far_end": "open", "highest": None}
 
@@ -62,7 +67,7 @@ class Reservoir:
         floor: bottom of the reservoir, which the water presses too; None: it has none.
         tail_face: face of the tail water, at rest; given with ``tail``.
         tail: height of the tail water [m].
-        silt: height of the silt before the face [m]; None: no silt.
+        silt: height of the silt before the face [m], from its foot to the level; None: no silt.
         silt_weight: weight of the silt under water, gamma' [N/m³].
         silt_ratio: K, its horizontal pressure over the vertical one.
         gamma: weight of the water [N/m³].
@@ -116,6 +121,11 @@ class Reservoir:
                 f"Reservoir: the tail water at {self.tail:g} m is above the level {self.level:g} "
                 "m: exchange face and tail_face"
             )
+        if self.silt is not None and self.silt > self.level:
+            raise InputError(
+                f"Reservoir: the silt at {self.silt:g} m is above the level {self.level:g} m, and "
+                "silt_weight is that under water: give a lower silt, or a Pressure for what is dry"
+            )
 
     def _refuse_unread(self) -> None:
         """Raise InputError for what the model does not read."""
@@ -166,9 +176,10 @@ class Reservoir:
             thickness: of the section [m].
 
         Raises:
-            InputError: a level above the face or below it, and faces that the model does not take.
+            InputError: levels that do not go with their faces, and faces that the model does not
+                take.
         """
-        bottom, top = self._find_ends(space)
+        bottom = self._check_levels(space)
         if self.model in ("at rest", "acoustic"):
             return None
         if self.model == "added mass":
@@ -180,26 +191,47 @@ class Reservoir:
         """Return rho of the water [kg/m³]."""
         return self.gamma / STANDARD_GRAVITY
 
-    def _find_ends(self, space: FemSpace) -> tuple[float, float]:
-        """Return the lowest and the highest height [m] of nodes of the face. Collective.
+    def _check_levels(self, space: FemSpace) -> float:
+        """Return the height of the foot of the face [m]. Collective.
 
         Raises:
-            InputError: a level above the face or below it.
+            InputError: a level above its face or below it, tail water above its face, and silt
+                below the face.
         """
-        heights = space.points[space.facet_blocks(self.face.indices), -1]
-        bottom = -largest(space.comm, np.max(-heights, initial=-np.inf))
-        top = largest(space.comm, np.max(heights, initial=-np.inf))
-        if self.level > top + ALIKE * (top - bottom):
-            raise InputError(
-                f"Reservoir: the level {self.level:g} m is above the top of '{self.face.name}' at "
-                f"{top:g} m: water that flows over is not modelled, so give a lower level"
-            )
+        bottom, top = _find_ends(space, self.face)
+        self._refuse_flood("level", self.level, self.face, bottom, top)
+        if self.tail_face is not None and self.tail is not None:
+            ends = _find_ends(space, self.tail_face)
+            self._refuse_flood("tail water", self.tail, self.tail_face, *ends)
         if self.level <= bottom:
             raise InputError(
                 f"Reservoir: the level {self.level:g} m is below the foot of '{self.face.name}' at "
                 f"{bottom:g} m: give a higher level, or leave the reservoir out"
             )
-        return bottom, top
+        if self.silt is not None and self.silt < bottom:
+            raise InputError(
+                f"Reservoir: the silt at {self.silt:g} m is below the foot of '{self.face.name}' "
+                f"at {bottom:g} m: give a higher silt, or leave it out"
+            )
+        return bottom
+
+    def _refuse_flood(
+        self, what: str, level: float, face: Facets, bottom: float, top: float
+    ) -> None:
+        """Raise InputError for water above its face.
+
+        Args:
+            what: the water.
+            level: its height [m].
+            face: that it presses.
+            bottom: height of the foot of the face [m].
+            top: height of its top [m].
+        """
+        if level > top + ALIKE * (top - bottom):
+            raise InputError(
+                f"Reservoir: the {what} {level:g} m is above the top of '{face.name}' at "
+                f"{top:g} m: water that flows over is not modelled, so give a lower level"
+            )
 
     def _assemble_westergaard(self, space: FemSpace, bottom: float, thickness: float) -> Any:
         """Return ∫ 7/8 rho sqrt(h (h - y)) (u·n)(v·n). Collective."""
@@ -261,7 +293,7 @@ class Reservoir:
                 "Reservoir: model 'acoustic' does not go with bodies that come and go by stages: "
                 "give 'incompressible' or 'added mass'"
             )
-        self._find_ends(space)
+        self._check_levels(space)
         wet = self._find_wet_face(space, thickness)
         length = self._find_length(wet)
         highest = self.highest or OVERTONES * self.speed / (4.0 * wet.depth)
@@ -272,6 +304,12 @@ class Reservoir:
                 f"about {modes:.0f} modes, and {MOST_MODES} is the most: give a lower highest, or "
                 "a smaller length"
             )
+        columns = count_columns(wet.depth, length, highest, self.speed)
+        if columns > MOST_COLUMNS:
+            raise InputError(
+                f"Reservoir: the water over {length:g} m has {columns} columns of cells, and "
+                f"{MOST_COLUMNS} is the most: give a smaller length"
+            )
         data = WaterData(
             density=self.density,
             speed=self.speed,
@@ -281,7 +319,32 @@ class Reservoir:
             highest=highest,
             thickness=thickness,
         )
-        return AcousticWater(space, wet, data)
+        water = AcousticWater(space, wet, data)
+        if water.equations.modes == 0 and space.comm.rank == 0:
+            log.warning(
+                "Reservoir: no mode of the water is below %g Hz, so that it is incompressible: "
+                "give a higher 'highest', or model 'incompressible'",
+                highest,
+            )
+        return water
+
+
+def _find_ends(space: FemSpace, face: Facets) -> tuple[float, float]:
+    """Return the lowest and the highest height [m] of nodes of a face. Collective.
+
+    Raises:
+        InputError: a face of bodies that are absent.
+    """
+    there = face.indices[find_present(space.mesh, space.absent, face)]
+    heights = space.points[space.facet_blocks(there), -1]
+    bottom = -largest(space.comm, np.max(-heights, initial=-np.inf))
+    top = largest(space.comm, np.max(heights, initial=-np.inf))
+    if bottom > top:
+        raise InputError(
+            f"Reservoir: '{face.name}' is the face of bodies that are absent: give a reservoir "
+            "when they are there"
+        )
+    return bottom, top
 
 
 def add_water(reservoir: Reservoir, space: FemSpace, thickness: float) -> None:

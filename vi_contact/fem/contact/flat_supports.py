@@ -50,7 +50,7 @@ def choose_boundary(
     if not body_turns:
         raise InputError(
             "contact_surface: facets are not given, and only a body that turns lands with all of "
-            "its boundary: give the part that looks towards the obstacle, such as tags['base']"
+            "its boundary: give facets, the part that looks towards the obstacle"
         )
 
     def mark_all(points: Array) -> Array:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...core.algebra import Array, Mask, from_each, total
 from .. import compat
+from ..body.absent import find_present
 from ..body.space import FemSpace
 from ..mesh.tagged_mesh import Facets
 
@@ -26,10 +27,10 @@ def keep_present(
     """
     if space.absent is None:
         return facets1, facets2
-    there1 = find_present(space, facets1)
+    there1 = find_present(space.mesh, space.absent, facets1)
     if facets2 is None:
         return _pick(facets1, there1), None
-    there2 = find_present(space, facets2)
+    there2 = find_present(space.mesh, space.absent, facets2)
     middles = np.concatenate(from_each(space.comm, _find_middles(space, facets2)))
     flags = np.concatenate(from_each(space.comm, there2))
     if len(middles) and len(facets1.indices):
@@ -43,17 +44,6 @@ def keep_present(
 def is_there(space: FemSpace, facets: Facets) -> bool:
     """Say whether any facet of a group is left, or no body is ever absent. Collective."""
     return space.absent is None or total(space.comm, len(facets.indices)) > 0.0
-
-
-def find_present(space: FemSpace, facets: Facets) -> Mask:
-    """Return which facets (k,) have a present cell on this rank."""
-    if space.absent is None:
-        return np.ones(len(facets.indices), dtype=bool)
-    dim = space.mesh.topology.dim
-    space.mesh.topology.create_connectivity(dim - 1, dim)
-    beside = space.mesh.topology.connectivity(dim - 1, dim)
-    there = [not space.absent[beside.links(facet)].all() for facet in facets.indices]
-    return np.array(there, dtype=bool)
 
 
 def _find_middles(space: FemSpace, facets: Facets) -> Array:

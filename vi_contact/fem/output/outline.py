@@ -8,9 +8,9 @@ import ufl
 
 from ...core.algebra import Array
 from .. import compat
+from ..body.absent import find_present
 from ..body.space import FemSpace
 from ..compat import Indices
-from ..contact.present import find_present
 from ..mesh.tagged_mesh import Facets
 
 
@@ -81,7 +81,7 @@ def outline(
     drawn = []
     for group in groups:
         # each facet is drawn by its owner, with the end of least coordinates first
-        present = group.indices[find_present(space, group)]
+        present = group.indices[find_present(mesh, space.absent, group)]
         own = present[present < mesh.topology.index_map(1).size_local]
         corners = mesh.geometry.x[compat.entities_to_geometry(mesh, 1, own)][..., :2].tolist()
         lines = []

@@ -28,7 +28,7 @@ from .histories import (
     scale_values,
 )
 from .records import SAMPLES_A_PERIOD
-from .report_words import CHARTS_OF_THE_WHOLE
+from .report_words import CHARTS_OF_THE_WHOLE, begins
 
 # What is no more than this is nothing: a term of energy over the largest one, and the range of a
 # column over its size.
@@ -215,7 +215,7 @@ def chart_groups(
 
 def list_varying(run: Run, prefix: str) -> list[str]:
     """List the columns of this beginning that are not constant, those that vary most first."""
-    ranges = {name: _find_range(run, name) for name in run.columns if name.startswith(prefix)}
+    ranges = {name: _find_range(run, name) for name in run.columns if begins(name, (prefix,))}
     return sorted((name for name in ranges if ranges[name] > 0.0), key=lambda name: -ranges[name])
 
 

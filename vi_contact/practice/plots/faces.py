@@ -301,7 +301,7 @@ def set_limits(
         # narrow panels have room for few numbers
         share = (last - first) / (float((high - low).max() + 2.0 * room) or 1.0)
         bins = 5 if in_space else int(np.clip(6.0 * share, 1.0, 5.0))
-        axis.locator_params(letter, nbins=bins, min_n_ticks=1)
+        axis.locator_params(letter, nbins=bins, min_n_ticks=min(bins, 2))
     if in_space:
         axis.set_box_aspect(high - low + 2.0 * room, zoom=0.85)  # with room for names
         axis.view_init(25.0, -60.0, vertical_axis=up)

@@ -19,6 +19,8 @@ SUMMARY = {
     "worst certificate": "{worst}",
     "energy defect": "{energy_defect}",
 }
+# Columns of the recorder Uplift, which are forces of water, and no open shares of parts.
+FORCES_OF_WATER = ("uplift_force", "uplift_effective")
 # Charts of histories: title -> beginnings of columns; of these the first that move.
 CHARTS = {
     "thrust, normal force": ("N_", "contact_resultant", "contact_force_"),
@@ -26,6 +28,9 @@ CHARTS = {
     "sliding": ("sliding_", "slip_", "contact_max_slip"),
     "opening": ("opening_",),
     "open share": ("uplift_", "contact_uplift"),
+    "length of the crack": ("crack_length",),
+    "force of the water in the joint": ("uplift_force",),
+    "normal force less that of the water": ("uplift_effective",),
     "pressure at the low end": ("pressure_low_",),
     "pressure at the high end": ("pressure_high_", "contact_max_pressure"),
     "moment": ("M_",),
@@ -56,6 +61,9 @@ RESULTS = {
     "height of the thrust, when the thrust is largest": ("height_",),
     "height of the thrust over the height of the part, when the thrust is largest": ("level_",),
     "open share": ("contact_uplift", "uplift_"),
+    "length of the crack": ("crack_length",),
+    "force of the water in the joint": ("uplift_force",),
+    "normal force less that of the water": ("uplift_effective",),
     "largest slip": ("contact_max_slip", "slip_"),
     "mean sliding; its end less its start is what remains": ("sliding_",),
     "eccentricity of the thrust from the middle of its part": ("e_",),
@@ -141,3 +149,8 @@ SAY = {
         "{defect:.1e} of the largest energy ({most:.4g} J)."
     ),
 }
+
+
+def begins(column: str, prefixes: tuple[str, ...]) -> bool:
+    """Say whether a column begins with one of the prefixes; a force of water is asked for whole."""
+    return column in prefixes if column in FORCES_OF_WATER else column.startswith(prefixes)

@@ -30,6 +30,7 @@ from .report_words import (
     RESULTS,
     SAY,
     SUMMARY,
+    begins,
 )
 
 # What of a part that stands upright says nothing: its thrust has a height in place of e.
@@ -202,7 +203,7 @@ def _list_results(
     t = run.history["t"]
     for name in run.columns:
         values = run.history.get(name)
-        if not name.startswith(prefixes) or values is None:
+        if not begins(name, prefixes) or values is None:
             continue
         if values.ndim != 1 or np.isnan(values).all():
             continue

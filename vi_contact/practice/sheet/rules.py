@@ -12,6 +12,7 @@ import numpy as np
 
 from ...core.algebra import Array
 from ...run.recorders.contact_parts import is_upright
+from ..plots.report_words import begins
 
 History = Mapping[str, Array]  # column -> values (rows,)
 Names = Collection[str]
@@ -69,7 +70,7 @@ def _begin(*prefixes: str) -> Callable[[Names], list[str]]:
 
 def _list_columns(names: Names, *, prefixes: tuple[str, ...]) -> list[str]:
     """Return the columns that begin with one of the prefixes."""
-    return [name for name in names if name.startswith(prefixes)]
+    return [name for name in names if begins(name, prefixes)]
 
 
 def _find_level(kind: str) -> Callable[[Names], list[str]]:

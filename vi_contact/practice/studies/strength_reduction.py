@@ -16,7 +16,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ...core.algebra import largest
-from ...core.arguments import check_fields
+from ...core.arguments import check_arguments
 from ...core.checks import number, provides
 from ...core.errors import InputError, StepFailure
 from ...core.internal import remembers
@@ -140,14 +140,15 @@ class _Search:
         return next(iter(quasi_static(weak, [begin.t], state=begin, **given)))
 
 
+@check_arguments
 def strength_reduction(
     problem: Any,
     *,
     comm: Any = None,
-    start: float = 1.0,
-    tolerance: float = 0.01,
+    start: Annotated[float, Positive] = 1.0,
+    tolerance: Annotated[float, Positive] = 0.01,
     solver: Solver | None = None,
-    certificate: float = TOLERANCE,
+    certificate: Annotated[float, Positive] = TOLERANCE,
 ) -> StrengthReduction:
     """Return the factor by which c and tan phi may be divided. Collective.
 
@@ -163,13 +164,13 @@ def strength_reduction(
         certificate: tolerance of the certificate of every equilibrium, relative.
 
     Raises:
-        InputError: no material yields, or one does not say what it is with another strength; no
-            equilibrium at any small factor, or one at every large factor.
+        InputError: a number that is not above zero; no material yields, or one does not say what
+            it is with another strength; no equilibrium at any small factor, or one at every large
+            factor.
     """
     if hasattr(problem, "tables"):
         problem = _build_case(problem, comm)
     provides(OWNER, "problem", problem, ("surface", "system"), "give a ContactProblem or a case")
-    check_fields(_Settings(start, tolerance, certificate))
     if not remembers(problem.system.internal):
         raise InputError(
             f"{OWNER}: no material of this body yields, so its strength has no limit: give "
@@ -187,15 +188,6 @@ def strength_reduction(
     last = ordered[-1]
     trials = tuple(sorted(search.trials, key=lambda trial: trial.factor))
     return StrengthReduction(low, high, trials, last[1], last[2], ordered[0][2])
-
-
-@dataclass(frozen=True)
-class _Settings:
-    """Check numbers that are given: see ``strength_reduction``."""
-
-    start: Annotated[float, Positive]
-    tolerance: Annotated[float, Positive]
-    certificate: Annotated[float, Positive]
 
 
 def _build_case(case: Any, comm: Any) -> ContactProblem:

@@ -123,7 +123,12 @@ class CondensedFriction:
         )
 
     def reactions(
-        self, step: StepProblem, free: Array, rigid: Mask, near: Array | None = None
+        self,
+        step: StepProblem,
+        free: Array,
+        rigid: Mask,
+        near: Array | None = None,
+        small: Any = None,
     ) -> tuple[FrictionResult, Mask, Array]:
         """Return the reactions of a step, and where contact unknowns are put. Collective.
 
@@ -135,6 +140,7 @@ class CondensedFriction:
             free: (m d,) contact unknowns without reactions.
             rigid: (m,) which supports are.
             near: reactions (m, d) of a step like it, to begin with; None: the contact set.
+            small: what solves the small problem of another flexibility; None: ``self.small``.
 
         Returns:
             The answer to the small problem; which contact unknowns (m d,) are held, and on what
@@ -158,7 +164,7 @@ class CondensedFriction:
         def solve(mu: Array, before: FrictionResult | None) -> FrictionResult:
             """Solve the small problem of all conditions with coefficients mu."""
             guess = (active if near is None else near) if before is None else before.r
-            return self.small.solve(q, cohesion, mu, guess)
+            return (small or self.small).solve(q, cohesion, mu, guess)
 
         def slip_of(answer: FrictionResult) -> Array:
             """Return the slip of the conditions of this rank."""

@@ -219,8 +219,11 @@ class Hyperstatic:
             for _ in range(sweeps):
                 r = sweep(r)
                 count += 1
-                if step.residual(r, step.w(r)) <= step.rounding(r):
+                rounding = step.rounding(r)
+                if step.residual(r, step.w(r)) <= rounding:
                     return r, count, history
+                if not rounding <= step.unit:  # of a G that is not positive sweeps may grow
+                    raise failure
             before = r * self._delassus.scale
             start = before
         assert failure is not None
@@ -322,6 +325,8 @@ class Hyperstatic:
             split = split_least(
                 r[rows], ring, states.pick(rows), self._weights[rows], self._movable[rows]
             )
+            # Rounding of the split must not press an open condition, which would count as closed.
+            split = np.where(states.closed[rows][:, None], split, r[rows])
             split[:, 0] = np.where(
                 states.bilateral[rows], split[:, 0], np.maximum(split[:, 0], 0.0)
             )

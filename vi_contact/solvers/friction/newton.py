@@ -116,8 +116,8 @@ class FrictionNewton(Settings):
             for _ in range(FIRST_SWEEPS * 2**attempt):
                 r = sweep(r)
                 sweeps += 1
-                # With a G that is not symmetric sweeps may grow: they lead nowhere.
-                if not step.delassus.symmetric and not step.rounding(r) <= step.unit:
+                # With a G that is not symmetric or positive sweeps may grow: they lead nowhere.
+                if not step.rounding(r) <= step.unit:
                     r = np.zeros_like(r)
                     break
         return LastIterate(r, len(history) + sweeps, history)

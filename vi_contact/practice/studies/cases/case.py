@@ -39,6 +39,7 @@ from ....fem.body.reservoir import Reservoir
 from ....fem.contact.joined import joined_surfaces
 from ....fem.mesh.communicators import MpiComm
 from ....fem.mesh.tagged_mesh import Tags, build_mesh, read_mesh
+from ....laws.hyperelastic import TurningLaw
 from ....laws.mass import ConsistentMass
 from ....laws.materials import LinearElastic
 from ....laws.orthotropic import Orthotropic
@@ -102,7 +103,9 @@ TABLES: dict[str, Any] = {
     "mesh": MeshScript | MeshFile,
     "beam": BeamBody,
     "particle": ParticleBody,
-    "material": Mapping[str, LinearElastic | Orthotropic | Heterogeneous | YieldingMaterial],
+    "material": Mapping[
+        str, LinearElastic | Orthotropic | Heterogeneous | YieldingMaterial | TurningLaw
+    ],
     "system": make_callee(assemble, keys={"clamped": "fixed"}, supplied=(*SUPPLIED, "reservoir")),
     "reservoir": make_callee(Reservoir),
     "strain_compatible": CALL,

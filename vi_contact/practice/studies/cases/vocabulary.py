@@ -44,6 +44,7 @@ from ....fem import (
 )
 from ....fem.body.blending import Coupling
 from ....fem.contact.matching import Matching
+from ....laws.hyperelastic import TurningLaw
 from ....laws.impact import VelocityUpdate
 from ....laws.materials import DampedBy, Damping, Density, LinearElastic, Section
 from ....laws.orthotropic import Orthotropic
@@ -76,6 +77,7 @@ _KINDS: Mapping[ModuleType, tuple[Any, ...]] = {  # room -> the kinds of things 
         LinearElastic,
         Orthotropic,
         YieldingMaterial,
+        TurningLaw,
         Section,
         Damping,
         FrictionLaw,
@@ -140,7 +142,7 @@ def record(
 @check_arguments
 def surface(
     system: SemiDiscreteSystem,
-    facets: Facets,
+    facets: Facets | None = None,
     *,
     obstacle: Obstacle | None = None,
     points: Annotated[Sequence[tuple[float, ...]] | None, Unit("m")] = None,
@@ -157,7 +159,7 @@ def surface(
 
     Args:
         system: of the body.
-        facets: the part of its boundary.
+        facets: the part of its boundary; None: all of it, of a body that turns.
         obstacle: what it may touch; None: ``Touching()``.
         points: (k, d) [m]; only the nodes nearest to them have conditions; None: all have.
         feature_angle: angle [rad]; facets that turn by less from one another are one smooth face.
@@ -531,6 +533,7 @@ _PLACES: tuple[tuple[Any, str], ...] = (
     (Orthotropic, "[material.NAME]"),
     (Heterogeneous, "[material.NAME]"),
     (YieldingMaterial, "[material.NAME]"),
+    (TurningLaw, "[material.NAME]"),
     (Damping, "[system.damping]"),
     (Section, "[system.section]"),
     (Traction, "[[system.loads]]"),

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from .....core.units import STANDARD_GRAVITY
+from .pen import list_objects
 
 STEPS = 20.0  # in a period
 PASSAGE = 10.0  # steps in the time b/V of a layer (CHOSEN; the demos take 20)
@@ -54,6 +55,7 @@ def find_warnings(model: Mapping[str, Any]) -> Iterator[str]:
     yield from _find_braked_bodies(model)
     yield from _find_coarse_meshes(model)
     yield from _find_long_steps(model)
+    yield from _find_unlike_levels(model)
 
 
 def _find_odd_bodies(model: Mapping[str, Any]) -> Iterator[str]:
@@ -183,3 +185,27 @@ def _find_long_steps(model: Mapping[str, Any]) -> Iterator[str]:
             f"with the contact open, {lifted:.3g} s: what moves after it has lifted off is "
             "computed too slowly, so shorten [run] dt"
         )
+
+
+def _find_unlike_levels(model: Mapping[str, Any]) -> Iterator[str]:
+    """Tell of water in a joint that stands at another height than that before the dam."""
+    reservoir = {entry["name"]: entry["value"] for entry in list_objects(model, "reservoir")}
+    if not reservoir:
+        return
+    for part in list_objects(model, "contact"):
+        joint = {entry["name"]: entry["value"] for entry in list_objects(part, "joint")}
+        if "water: level" not in joint:
+            continue
+        for name, water in (("level", "the water"), ("tail", "the tail water")):
+            outside, inside = reservoir.get(name), joint.get(f"water: {name}")
+            if outside != inside:
+                yield (
+                    f"{water} stands at {_write_height(outside)} in [reservoir] and at "
+                    f"{_write_height(inside)} in the joint '{part['name']}': give one {name}, "
+                    "unless they differ there"
+                )
+
+
+def _write_height(height: float | None) -> str:
+    """Return a height with its unit, "no height" without one."""
+    return "no height" if height is None else f"{height:.6g} m"
