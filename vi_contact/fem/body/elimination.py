@@ -4,7 +4,8 @@
 
 P has a one for each free component, and one for each component that follows a free one; U(t) are
 the values of the held components, zero elsewhere. Without ties PᵀAP is a part of A, and no P is
-made.
+made. Components that follow several others (``blending``) have weights in their rows of P, and U
+has there what they follow of held ones: U = (I + L) times the values of the held components.
 """
 
 from typing import Any
@@ -32,7 +33,14 @@ class Elimination:
     """
 
     def __init__(
-        self, comm: MpiComm, free: Mask, held: Mask, *, followed: Indices | None, unknowns: int
+        self,
+        comm: MpiComm,
+        free: Mask,
+        held: Mask,
+        *,
+        followed: Indices | None,
+        unknowns: int,
+        blended: tuple[sp.csr_matrix, sp.csr_matrix] | None = None,
     ) -> None:
         """Make P where components follow others. Collective.
 
@@ -43,11 +51,21 @@ class Elimination:
             followed: (full,) which unknown of all ranks each owned component is or follows, -1
                 where it is held; None without ties.
             unknowns: how many free components there are on all ranks.
+            blended: rows (full,) of components that follow several others: of the free components
+                of all ranks, and of all components, of which held ones alone count; None on all
+                ranks without such.
         """
         self.free = free
         self.held = held
         self.others = 0
-        self._P = None if followed is None else _make_selection(comm, free, followed, unknowns)
+        self._P: PetscMatrix | None = None
+        self._L: PetscMatrix | None = None
+        if followed is not None:
+            rows = _make_selection(free, followed, unknowns)
+            if blended is not None:
+                rows = rows + blended[0]
+                self._L = PetscMatrix(aij_of(blended[1], comm.mpi))
+            self._P = PetscMatrix(aij_of(rows, comm.mpi, int(free.sum())))
 
     def restrict(self, full: Array) -> Array:
         """Restrict nodal values (owned nodes, d) to the free vector."""
@@ -65,11 +83,16 @@ class Elimination:
             values: (full,) U at the held components, zero elsewhere; it is overwritten.
         """
         of_nodes = u[: len(u) - self.others]
+        values = self.lift(values)
         if self._P is None:
             values[self.free] = of_nodes
         else:
             values += self._P @ of_nodes
         return values
+
+    def lift(self, values: Array) -> Array:
+        """Return (I + L) values (full,): what follows held components in the mean moves too."""
+        return values if self._L is None else values + self._L @ values
 
     def pull(self, force: Array) -> Array:
         """Return Pᵀ f, forces on the free components; tied nodes count at their partners."""
@@ -83,24 +106,31 @@ class Elimination:
         return _take_part(full, self.free, self.free)
 
     def take_held_columns(self, full: Any) -> Any:
-        """Return a matrix of all components with the columns of held ones only. Collective."""
-        return _take_part(full, np.ones_like(self.free), self.held)
+        """Return A (I + L) of a matrix of all components, with the columns of held ones only.
+
+        Collective.
+        """
+        every = np.ones_like(self.free)
+        if self._L is None:
+            return _take_part(full, every, self.held)
+        lifted = full.matMult(self._L.mat)
+        lifted.axpy(1.0, full)
+        part = _take_part(lifted, every, self.held)
+        lifted.destroy()
+        return part
 
 
-def _make_selection(comm: MpiComm, free: Mask, followed: Indices, unknowns: int) -> PetscMatrix:
-    """Return P: one 1 per free component, and one for each that follows another. Collective.
+def _make_selection(free: Mask, followed: Indices, unknowns: int) -> sp.csr_matrix:
+    """Return rows of P: one 1 per free component, and one for each that follows another.
 
     Args:
-        comm: the communicator of the matrices.
         free: (full,) mask of the owned free components.
         followed: (full,) the unknown that each owned component is or follows, -1 where it is held.
         unknowns: how many there are on all ranks.
     """
     moving = np.flatnonzero(followed >= 0)
-    ones = sp.csr_matrix(
-        (np.ones(len(moving)), (moving, followed[moving])), shape=(len(free), unknowns)
-    )
-    return PetscMatrix(aij_of(ones, comm.mpi, int(free.sum())))
+    entries = (np.ones(len(moving)), (moving, followed[moving]))
+    return sp.csr_matrix(entries, shape=(len(free), unknowns))
 
 
 def _take_part(full: Any, rows: Mask, columns: Mask) -> Any:

@@ -18,6 +18,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, Mask, from_each, largest, total
 from ...core.checks import instance, refuse
@@ -28,13 +29,14 @@ from ..matrices.petsc_algebra import PetscAlgebra
 from ..mesh.communicators import MpiComm, keep_communicator
 from ..mesh.group_checks import cells_of
 from ..mesh.nodal_space import NodalSpace, bounding_box
-from ..mesh.numbering import NodeTable, facet_rows, node_numbers
+from ..mesh.numbering import NodeTable, facet_rows, find_outward, node_numbers
 from ..mesh.tagged_mesh import Cells, Facets
+from .blending import Blends, TiedSide
 from .elimination import Elimination
 from .hierarchical import Hierarchy, needs_hierarchy
 from .in_cells import find_in_cells, find_nodes_of_cells
 from .loads import Support
-from .ties import PLACE_TOLERANCE, UNTIED, Links, Tied, link
+from .ties import UNTIED, Links, Tied, link
 
 log = logging.getLogger(__name__)
 
@@ -118,9 +120,10 @@ class FemSpace(NodalSpace):
         tied: (owned nodes, d) mask of components that follow those of another node.
         free: (owned full,) mask of the other components.
         tied_nodes: numbers of all nodes that move together with another, on every rank.
+        mean_nodes: numbers of all nodes that follow several others, on every rank.
         tied_unknowns: mask of the free unknowns of such nodes, None without ties.
         numbers: (owned nodes, d) which unknown of all ranks a component is, also one that follows;
-            -1 where held.
+            -1 where held, and where it follows several others.
         degree: 1 for P1 and Q1, 2 for P2 and Q2.
         quadrature_degree: that of all its forms; None: as UFL estimates it.
         nodes: (owned nodes,) their numbers (``mesh.numbering``: of mid-points too).
@@ -183,7 +186,9 @@ class FemSpace(NodalSpace):
         for support in supports:
             self.held[support.places] = True
         links = self._find_links() if tied else UNTIED
-        self.tied_nodes: Indices = np.union1d(links.followers, links.leaders) // self.dimension
+        moving = [links.followers, links.leaders, links.blends.followers]
+        self.tied_nodes: Indices = np.unique(np.concatenate(moving) // self.dimension)
+        self.mean_nodes: Indices = np.unique(links.blends.followers // self.dimension)
         self._leader = links.of_nodes(self.dimension) if tied else {}
         self.tied: Mask = self._find_followers(links) if tied else np.zeros(shape, dtype=bool)
         self.free: Mask = ~(self.held | self.tied).ravel()
@@ -209,6 +214,7 @@ class FemSpace(NodalSpace):
             self.held.ravel(),
             followed=self.numbers.ravel() if tied else None,
             unknowns=self.unknowns,
+            blended=self._number_blends(links.blends) if len(links.blends.followers) else None,
         )
         self.forms: Any = None
         self.stands: Array | None = None
@@ -284,15 +290,30 @@ class FemSpace(NodalSpace):
     def _find_links(self) -> Links:
         """Return which unknowns move as others do, on every rank. Collective."""
         sides = [(self._gather(tie.first), self._gather(tie.second)) for tie in self.ties]
-        return link(self.ties, sides, self.dimension, PLACE_TOLERANCE * self.size)
+        return link(self.ties, sides, self.dimension, self.size)
 
-    def _gather(self, facets: Facets) -> tuple[Indices, Array]:
-        """Return numbers, ascending, and points of the nodes of facets on all ranks. Collective."""
+    def _gather(self, facets: Facets) -> TiedSide:
+        """Return a tied boundary: its nodes on all ranks, by their numbers. Collective."""
         blocks = self.facet_blocks(facets.indices)
-        parts = self.comm.bcast(self.comm.gather((self.nodes[blocks], self.points[blocks])))
-        numbers, points = (np.concatenate(part) for part in zip(*parts, strict=True))
+        rows = self.node_of_block[facet_rows(self.V, facets.indices)]
+        outward = find_outward(self.mesh, facets.indices)
+        own = (self.nodes[blocks], self.points[blocks], self.held[blocks], rows, outward)
+        parts = self.comm.bcast(self.comm.gather(own))
+        numbers, points, held, rows, outward = (
+            np.concatenate(part) for part in zip(*parts, strict=True)
+        )
         order = np.argsort(numbers)
-        return numbers[order], points[order]
+        # each facet once, in an order that no number of ranks changes
+        _, first = np.unique(np.sort(rows, axis=1), axis=0, return_index=True)
+        return TiedSide(
+            facets.name,
+            numbers[order],
+            points[order],
+            held[order],
+            np.searchsorted(numbers[order], rows[first]),
+            len(compat.sub_entities(self.mesh, self.mesh.topology.dim - 1)[0]),
+            outward[first],
+        )
 
     def _find_followers(self, links: Links) -> Mask:
         """Return which owned components (owned nodes, d) follow another node. Collective.
@@ -310,7 +331,8 @@ class FemSpace(NodalSpace):
                 "only: prescribe both sides alike, or tie the other components (components=)"
             )
         ids = self.nodes[:, None] * self.dimension + np.arange(self.dimension)
-        return np.isin(ids, links.followers[~followers_held])
+        moving = np.concatenate([links.followers[~followers_held], links.blends.followers])
+        return np.isin(ids, moving)
 
     def _number_followers(self, links: Links, numbers: Indices) -> Indices:
         """Return the unknown of every owned component, that of their leaders for followers.
@@ -333,6 +355,34 @@ class FemSpace(NodalSpace):
         follows = self.tied.ravel()[row]
         numbers[row[follows]] = leader[follows]
         return numbers
+
+    def _number_blends(self, blends: Blends) -> tuple[Any, Any]:
+        """Return the rows of owned components that follow several others. Collective.
+
+        Args:
+            blends: what they follow.
+
+        Returns:
+            sparse matrices with a row for each owned component: of the free unknowns of all ranks,
+            and of the held components of all ranks.
+        """
+        d = self.dimension
+        first = int(self.comm.mpi.exscan(self.held.size) or 0)
+        places = np.arange(first, first + self.held.size).reshape(-1, d)
+        columns = [
+            self._read_everywhere(blends.leaders, values).astype(np.int64)
+            for values in (self.numbers, np.where(self.held, places, -1))
+        ]
+        blocks = self.blocks_of(blends.followers // d)[blends.rows]
+        row = d * blocks + blends.followers[blends.rows] % d
+        owned = (blocks >= 0) & (blocks < len(self.nodes))
+        widths = (self.unknowns, int(total(self.comm, self.held.size)))
+        made = []
+        for column, width in zip(columns, widths, strict=True):
+            used = owned & (column >= 0)
+            entries = (blends.weights[used], (row[used], column[used]))
+            made.append(sp.csr_matrix(entries, shape=(self.held.size, width)))
+        return made[0], made[1]
 
     def _read_everywhere(self, numbers: Indices, values: Any) -> Array:
         """Return the values (m,) of components of nodes of any rank, on every rank. Collective.

@@ -157,6 +157,12 @@ class StrainPoints:
 
     def free_matrix(self, D: Array) -> Any:
         """Return K of the free unknowns of tangents D (points, n, n) [Pa]. Collective."""
+        if len(self._space.mean_nodes):
+            # components that follow several others have no number of their own
+            full = self.full_matrix(D)
+            part = self._space.reduce(full)
+            full.destroy()
+            return part
         if self._free is None:
             self._free = CellMatrices(
                 self._dofs,

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ...core.algebra import Array, Indices, Mask
+from ...core.algebra import Array, Indices, Mask, largest
+from ...core.errors import InputError
 from ..matrices.petsc_algebra import PetscAlgebra, PetscMatrix
 from ..matrices.petsc_rows import aij_of, rows_of
 from .acoustic_water import WaterData, WaterEquations, find_water
@@ -157,6 +158,12 @@ class AcousticWater:
         mine = np.flatnonzero((place >= 0) & (place < face.own.shape[0]))
         unknown = np.zeros(len(face.touched))
         unknown[mine] = space.numbers.ravel()[place[mine]]
+        follows = space.tied.ravel()[place[mine]] & (unknown[mine] < 0.0)
+        if largest(space.comm, follows.any()):
+            raise InputError(
+                "compressible water touches nodes that are tied by matching= to several others: "
+                "mesh the tied boundaries alike there"
+            )
         numbers = np.rint(space.comm.sum(unknown)).astype(np.int64)
 
         # rows of the face, of this rank's unknowns

@@ -23,7 +23,6 @@ Mech. Engrg. 194 (2005); dual functions of partly covered segments: Cichosz and 
 (2011).
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -32,10 +31,13 @@ import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, Mask
 from ...core.errors import InputError
+from ..body.blending import TiedSide
 from .covering import Carried, Coupled, Covered, couple, extrapolation
 from .curves import FARTHER, curvatures, may_overlap
 from .matching import EDGE_ON, Matched, Side, common_nodes, refuse_same_way
 from .mortar_in_space import ROUND_OFF, hand_over, in_space
+from .segments import cut_segment, find_normals
+from .tied_sides import couple_sides
 
 POINTS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)  # of Gauss, on [0, 1], weights ½
 AT_NODE = 1e-9  # of a segment: round-off of where its covered part ends
@@ -57,6 +59,18 @@ class DualMortar:
     """
 
     partial: ClassVar[bool] = True  # parts of side 1 in front of nothing have no conditions
+
+    def couple(
+        self, side: TiedSide, other: TiedSide, tied: Indices
+    ) -> tuple[Indices, sp.csr_matrix, float]:
+        """Return the rows of P, P itself, and the covered share of a tied boundary.
+
+        Args:
+            side: the boundary whose nodes follow.
+            other: the one that they follow.
+            tied: (k,) places on ``other`` of nodes that move as one there does, -1 for the others.
+        """
+        return couple_sides(self, side, other, tied)
 
     def match(self, side1: Side, side2: Side, size: float) -> Matched:
         """Return what the nodes of side 1 face by the dual mortar coupling.
@@ -141,14 +155,14 @@ def _in_plane(side1: Side, side2: Side) -> Coupled:
     """Couple sides of plane bodies: find pieces, see what they cover, then assemble D and M."""
     ends1 = side1.nodes.points[side1.facets]
     ends2 = side2.nodes.points[side2.facets]
-    normals1 = _normals(side1, ends1)
-    normals2 = _normals(side2, ends2)
+    normals1 = find_normals(side1, ends1)
+    normals2 = find_normals(side2, ends2)
     H = curvatures(ends2, side2.facets, normals2)
 
     segments = []
     # project side 2 onto each segment of side 1, and integrate over the pieces that this makes
     for facet, ends, normal in zip(side1.facets, ends1, normals1, strict=True):
-        pieces = list(_pieces(ends, normal, ends2, normals2))
+        pieces = list(cut_segment(ends, normal, ends2, normals2))
         if sum(high - low for low, high, *_ in pieces) > ROUND_OFF:
             length = float(np.linalg.norm(ends[1] - ends[0]))
             overlap = _find_overlap(pieces, ends, ends2, H)
@@ -289,49 +303,6 @@ def _carry(
             psi = share * weight * _hats(place) @ inverse
             for segment, values in part.mixed.items():
                 M[k, facets2[segment]] = M[k, facets2[segment]].toarray().ravel() + psi @ values
-
-
-def _normals(side: Side, ends: Array) -> Array:
-    """Return outward unit normals (k, 2) of the segments with these ends (k, 2, 2)."""
-    along = ends[:, 1] - ends[:, 0]
-    normals = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
-    outward = np.sum(normals[:, None, :] * side.nodes.normals[side.facets], axis=(1, 2))
-    return np.asarray(np.where(outward[:, None] < 0.0, -normals, normals))
-
-
-def _pieces(
-    ends: Array, normal: Array, ends2: Array, normals2: Array
-) -> Iterator[tuple[float, float, int, Array]]:
-    """Yield the pieces of a segment of side 1, in its coordinate from 0 to 1.
-
-    Each is (low, high, segment of side 2, its coordinates at low and high): where several segments
-    lie opposite, the nearest.
-
-    Args:
-        ends: (2, 2) ends of the segment [m].
-        normal: (2,) its outward normal.
-        ends2: (k, 2, 2) ends of the segments of side 2 [m].
-        normals2: (k, 2) their outward normals.
-    """
-    # project the ends of all segments of side 2; those that face this one cut it at their ends
-    along = ends[1] - ends[0]
-    place = (ends2 - ends[0]) @ along / (along @ along)  # (k, 2): projections of the ends of side 2
-    height = (ends2 - ends[0]) @ normal
-    low = np.maximum(place.min(axis=1), 0.0)
-    high = np.minimum(place.max(axis=1), 1.0)
-    near = np.flatnonzero((normals2 @ normal < 0.0) & (high - low > 1e-12))
-    cuts = np.unique(np.concatenate([low[near], high[near]]))
-    for start, end in zip(cuts[:-1], cuts[1:], strict=True):
-        # of the segments in front of a piece, the nearest at its middle
-        middle = 0.5 * (start + end)
-        over = near[(low[near] < middle) & (middle < high[near])]
-        if end - start > 1e-12 and len(over):
-            slope = place[over, 1] - place[over, 0]
-            share = (middle - place[over, 0]) / slope
-            distance = np.abs(height[over, 0] + share * (height[over, 1] - height[over, 0]))
-            nearest = int(np.argmin(distance))
-            segment = int(over[nearest])
-            yield start, end, segment, (np.array([start, end]) - place[segment, 0]) / slope[nearest]
 
 
 def _integrate(

@@ -47,7 +47,14 @@ from .matching import Matched, Matching, NodeToNode, Side
 from .nodes import Nodes, everywhere, join_nodes
 from .present import is_there, keep_present
 from .skin import ROUND_OFF
-from .surface import contact_space, find_listed, make_prescribed_motion, merge_tied, nodes_on
+from .surface import (
+    contact_space,
+    find_listed,
+    make_prescribed_motion,
+    merge_tied,
+    nodes_on,
+    refuse_followers,
+)
 from .watching import Watched, sort_held, watch_nodes
 
 log = logging.getLogger(__name__)
@@ -132,6 +139,8 @@ def contact_pair(
     directions = snap_to_axes(nodes.normals)
     gap = _measure_gap(space, side1.name, side2, nodes, directions, matched)
     P = matched.P
+    faced = np.flatnonzero(np.asarray(abs(P).max(axis=0).todense()).ravel() > ROUND_OFF)
+    refuse_followers(space, side2.name, side2.nodes.numbers[faced], side2.nodes.points[faced])
     if len(space.tied_nodes):
         nodes, directions, shares = merge_tied(space, side1.name, nodes, directions, angle)
         gap = shares @ gap

@@ -590,6 +590,7 @@ def merge_tied(
     Raises:
         InputError: a node that is tied in some components only, or to one without such a condition.
     """
+    refuse_followers(space, name, nodes.numbers, nodes.points)
     leaders = space.leaders(nodes.numbers)
     # the row of a leader with the direction nearest to that of each node which follows it
     target = np.arange(len(nodes.numbers))
@@ -616,6 +617,23 @@ def merge_tied(
     merged = np.diff(shares.indptr) > 1
     directions = np.where(merged[:, None], snap_to_axes(shares @ directions), directions[targets])
     return replace(nodes.pick(targets), weights=weights), directions, shares
+
+
+def refuse_followers(space: FemSpace, name: str, numbers: Indices, points: Array) -> None:
+    """Raise InputError for nodes of a contact that follow several others through a tie.
+
+    Args:
+        space: the body's unknowns.
+        name: that of the boundary.
+        numbers: (k,) of its nodes.
+        points: (k, d) their coordinates [m].
+    """
+    for row in np.flatnonzero(np.isin(numbers, space.mean_nodes))[:1]:
+        raise InputError(
+            f"contact node {describe_point(points[row])} of '{name}' is tied by matching= to "
+            "several nodes: a contact beside such a tie takes the facets beside it alone, and both "
+            "bodies need nodes at the same places where tie and contact meet"
+        )
 
 
 def merge_ties(

@@ -203,7 +203,11 @@ class NodalWork:
             for k, motion in enumerate(rigid_motions(space.points, centre)):
                 if move_obstacles is not None:
                     self._direct.append(move_obstacles(np.where(straight, motion, 0.0)))
-                self._r.x.array[: motion.size] = np.where(where, motion, 0.0).ravel()
+                moved = np.where(where, motion, 0.0).ravel()
+                # what follows held nodes through ties takes its forces to them
+                self._r.x.array[: motion.size] = (
+                    space.elimination.lift(moved) if cells is None else moved
+                )
                 self._r.x.scatter_forward()
                 space.forms.follow(self._r)
                 if self._yields:

@@ -1,5 +1,6 @@
 """Record the energy ledger of a run."""
 
+import logging
 from collections.abc import Mapping
 from typing import ClassVar
 
@@ -9,6 +10,12 @@ from ...core.internal import remembers
 from ...core.ledger import Energies, compute_energies, energy_balance
 from ...core.problem import ContactProblem
 from ...core.step import Columns, Report, Row, State
+
+log = logging.getLogger(__name__)
+
+# CHOSEN: of the largest energy or input work so far; by so much may friction have given before it
+# is told
+GIVEN = 0.01
 
 
 class Energy:
@@ -27,7 +34,8 @@ class Energy:
     summed work of the residual of the equation of motion; ``summary.json`` has its size over the
     largest energy or work. A body that yields has D_plastic >= 0 too, and E counts what hardening
     stores. Each step costs three products, and damping and impacts cost one more
-    each.
+    each. Friction never gives energy. Where D_friction falls below zero by a hundredth of the
+    largest energy or work, the log warns once that the time scheme has made it.
     """
 
     _COLUMNS: ClassVar[Columns] = {
@@ -65,6 +73,8 @@ class Energy:
         self._yields = remembers(problem.system.internal)
         standing = problem.standing_at(state)
         self._now = compute_energies(standing.equations, state.u, state.v)
+        self._largest = abs(self._now.total)
+        self._told = False
         self._stored = self._compute_stored(state)
         sums = tuple(self.columns())[2:]
         self._sums = dict.fromkeys(sums, 0.0)
@@ -123,4 +133,23 @@ class Energy:
         }
         for term in self._sums:
             self._sums[term] += losses[term]
+        self._tell_gain(new.t)
         return self._row()
+
+    def _tell_gain(self, t: float) -> None:
+        """Warn once where friction has given energy, which a joint that springs back may do."""
+        self._largest = max(self._largest, abs(self._now.total), abs(self._sums["work_input"]))
+        given = -self._sums["loss_friction"]
+        if self._told or self._problem.joint is not None or not given > GIVEN * self._largest:
+            return
+        self._told = True
+        if self._problem.system.algebra.comm.rank == 0:
+            log.warning(
+                "friction has given %.3g J up to t = %.6g s, %.2g %% of the largest energy or work "
+                "so far, and friction can only take energy: the slip turns round within time "
+                "steps, and what follows may be made by the scheme. Take a smaller dt, or a scheme "
+                "whose friction cannot give energy, such as MoreauJean(theta=1.0) or Midpoint()",
+                given,
+                t,
+                100.0 * given / self._largest,
+            )

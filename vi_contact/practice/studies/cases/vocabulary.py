@@ -42,6 +42,7 @@ from ....fem import (
     Prescribed,
     Traction,
 )
+from ....fem.body.blending import Coupling
 from ....fem.contact.matching import Matching
 from ....laws.hyperelastic import TurningLaw
 from ....laws.impact import VelocityUpdate
@@ -88,7 +89,7 @@ _KINDS: Mapping[ModuleType, tuple[Any, ...]] = {  # room -> the kinds of things 
     ),
     ground_motion: (Excitation,),
     meshes: (MeshScript,),
-    fem: (Prescribed, Traction, BodyForce, Dashpots, Matching, FieldWriter),
+    fem: (Prescribed, Traction, BodyForce, Dashpots, Matching, Coupling, FieldWriter),
     solvers: (Solver,),
     normal: (SmallMethod,),
     friction: (FrictionMethod, Extrapolation),
