@@ -12,8 +12,8 @@ enough. theta falls as the body comes to rest. The answer is certified without v
 of the body which creeps slowly; another one may exist. The viscous force of a body that gives way
 does not fall, and such a stage is refused.
 
-The idea is that of the regularisation of P. Perzyna, Adv. Appl. Mech. 9 (1966) 243-377; that less
-dilatancy costs uniqueness: G. T. Houlsby and A. M. Puzrin, Principles of Hyperplasticity (2006).
+Sources: viscosity that makes flow unique, P. Perzyna, Adv. Appl. Mech. 9 (1966) 243-377; what less
+dilatancy takes from uniqueness, D. Bigoni and T. Hueckel, Int. J. Solids Struct. 28 (1991) 197-213.
 """
 
 import logging
