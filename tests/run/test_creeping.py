@@ -83,3 +83,40 @@ def test_a_footing_that_gives_way_is_told_with_its_place(comm: Any) -> None:
     message = r"no equilibrium to which the body creeps; it yields most near \(.*\): .*psi nearer"
     with pytest.raises(StepFailure, match=message):
         vc.static_equilibrium(problem)
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("psi", [0.0, 30.0])
+def test_the_limit_pressure_of_a_tube_of_soil(comm: Any, psi: float) -> None:
+    """A tube from a = 1 m to b = 2 m of soil with 20 kPa and 30° bears Y/(N - 1) [(b/a)^((N - 1)/N)
+    - 1] = 20348.169 Pa inside, N = (1 + sin phi)/(1 - sin phi), Y = 2 c cos phi/(1 - sin phi): all
+    of it yields, and equilibrium alone says the stresses, for any dilatancy."""
+    sine = np.sin(np.radians(30.0))
+    N = (1.0 + sine) / (1.0 - sine)
+    Y = 2.0 * 20e3 * np.cos(np.radians(30.0)) / (1.0 - sine)
+    exact = Y / (N - 1.0) * (2.0 ** ((N - 1.0) / N) - 1.0)
+    assert exact == pytest.approx(20348.169, rel=1e-7)
+
+    def bend(x: np.ndarray) -> np.ndarray:
+        r, angle = 2.0 ** x[:, 0], 0.5 * np.pi * x[:, 1]
+        return np.stack([r * np.cos(angle), r * np.sin(angle)], axis=1)
+
+    mesh, tags = fem.build_mesh(BlockMesh(divisions=(3, 4), deform=bend), comm)
+
+    def stand(pressure: float) -> vc.ContactProblem:
+        system = fem.assemble(
+            mesh,
+            MohrCoulomb(50e6, 0.3, 2000.0, 20e3, 30.0, psi),
+            degree=2,
+            prescribed=[
+                fem.Prescribed(tags["bottom"], components=(1,)),
+                fem.Prescribed(tags["top"], components=(0,)),
+            ],
+            loads=fem.Pressure(tags["left"], pressure),
+        )
+        return vc.ContactProblem(system, empty_surface(system.space.comm, 2))
+
+    push = stand(exact).system.load.at_rest(0.0) - stand(0.5 * exact).system.load.at_rest(0.0)
+    found = vc.limit_load(stand(0.5 * exact), force=2.0 * push, first=0.3, rtol=0.02)
+    assert found.multiplier + 0.5 == pytest.approx(1.0, abs=0.02)
+    assert found.lost_at - found.multiplier <= 0.011
