@@ -42,8 +42,9 @@ HALF = 0.5  # of the viscous force since a viscosity was too small: it is tried 
 STEADY = 0.98  # of the least viscous force: one that hardly falls
 PATIENCE = 6  # increments in which it hardly falls: the body gives way
 ADVICE = (
-    "less dilatancy than friction (psi < phi) leaves no equilibrium near: take smaller load steps, "
-    "integration='bbar', psi nearer to phi, or march in time with damping"
+    "the soil bears less than its loads, or flow with psi < phi has no equilibrium near: lower the "
+    "load, or take smaller load steps, integration='bbar', psi nearer to phi, or time steps with "
+    "damping"
 )
 
 
