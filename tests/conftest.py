@@ -44,7 +44,10 @@ os.environ |= {"COLUMNS": "100", "PYTHON_COLORS": "0", "LANGUAGE": "C"}
 CLONE = Path(__file__).resolve().parents[1]
 RANK = int(os.environ.get("OMPI_COMM_WORLD_RANK", os.environ.get("PMI_RANK", "0")))
 SIZE = int(os.environ.get("OMPI_COMM_WORLD_SIZE", os.environ.get("PMI_SIZE", "1")))
-LEFT_OUT = ("serial", "slow", "two_ranks") if SIZE > 2 else ("serial",) if SIZE > 1 else ()
+NOT_ON_THREE = ("serial", "slow", "two_ranks")
+LEFT_OUT = NOT_ON_THREE if SIZE > 2 else ("serial",) if SIZE > 1 else ()
+# whether tests/run.sh runs three ranks too, which two ranks can leave work to
+THREE_FOLLOW = SIZE == 2 and "3" in os.environ.get("VI_CONTACT_RANKS", "").split()
 # what they are made of runs on three ranks, they on two
 ABOVE = ("validation", "models", "soil", "studies", "house")
 TEST_SECONDS = 600  # a test that takes longer on an idle machine is taken to be stuck
@@ -158,9 +161,10 @@ def _left_out(item: pytest.Item) -> bool:
 
 def _covering(items: list[pytest.Item]) -> set[pytest.Item]:
     """Of every function one test: the first on two ranks, the last on three, where long ones are
-    left out too. Where ranks are in its name or that of its file, on two so many that each value of
-    each parameter occurs, and on three also what is long. All others run on one rank, where a law,
-    a scheme or a shape takes the path that it takes on several."""
+    left out too. On two also those functions are left out that three ranks run in the same suite.
+    Where ranks are in its name or that of its file, on two so many that each value of each
+    parameter occurs, and on three also what is long. All others run on one rank, where a law, a
+    scheme or a shape takes the path that it takes on several."""
     functions: dict[str, list[pytest.Item]] = {}
     for item in items:
         functions.setdefault(item.nodeid.split("[")[0], []).append(item)
@@ -169,18 +173,30 @@ def _covering(items: list[pytest.Item]) -> set[pytest.Item]:
         if SIZE > 2:
             if "ranks" in name or not ones[-1].get_closest_marker("long"):
                 kept.add(ones[-1])
-            continue
-        if "ranks" not in name:
+        elif "ranks" in name:
+            kept.update(_each_value(ones))
+        elif not (THREE_FOLLOW and _runs_on_three(ones[-1])):
             kept.add(ones[0])
-            continue
-        alike = set.intersection(*map(_parameters, ones)) if len(ones) > 1 else set()
-        seen: set[tuple[str, int]] = set()
-        for new in (all, any):  # those of new values only, then those of some new value
-            for item in ones:
-                values = _parameters(item) - alike
-                if item not in kept and (not values or new(value not in seen for value in values)):
-                    kept.add(item)
-                    seen |= values
+    return kept
+
+
+def _runs_on_three(item: pytest.Item) -> bool:
+    """Whether three ranks run this last test of its function, whose name does not speak of them."""
+    left_out = any(item.get_closest_marker(marker) for marker in (*NOT_ON_THREE, "long"))
+    return not left_out and item.path.parent.name not in ABOVE
+
+
+def _each_value(ones: list[pytest.Item]) -> list[pytest.Item]:
+    """So many tests of a function that each value of each of its parameters occurs."""
+    alike = set.intersection(*map(_parameters, ones)) if len(ones) > 1 else set()
+    seen: set[tuple[str, int]] = set()
+    kept: list[pytest.Item] = []
+    for new in (all, any):  # those of new values only, then those of some new value
+        for item in ones:
+            values = _parameters(item) - alike
+            if item not in kept and (not values or new(value not in seen for value in values)):
+                kept.append(item)
+                seen |= values
     return kept
 
 

@@ -27,8 +27,9 @@ status=0
 child=
 ranks=${VI_CONTACT_RANKS:-1 2 3}
 if [ "${1:-}" = --quick ]; then
-  ranks=1 # tests/conftest.py says which tests run
+  ranks=1
 fi
+export VI_CONTACT_RANKS=$ranks # tests/conftest.py says which tests run on how many
 tally=$(mktemp)
 trap 'rm -f "$tally"' EXIT
 trap 'kill "$child"; wait; exit 130' INT TERM

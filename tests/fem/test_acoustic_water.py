@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.linalg
+import scipy.sparse as sp
 from mpi4py import MPI
 from test_reservoir import stand
 
@@ -16,6 +17,7 @@ from vi_contact import fem, laws
 from vi_contact.core.errors import InputError
 from vi_contact.fem.body.acoustic_water import WaterData, find_water
 from vi_contact.fem.body.released_supports import begin_from, carry_over
+from vi_contact.fem.body.water_unknowns import add_entries
 from vi_contact.meshes import BlockMesh, TwoBlocks
 from vi_contact.run.damping import first_modes
 from vi_contact.run.modal import lowest_frequency
@@ -243,8 +245,8 @@ def test_any_number_of_ranks(comm: Any) -> None:
             assert np.abs(first - second).max() <= 1e-10 * np.abs(second).max()
 
 
-def march_on_rock(comm: Any, *, follower: bool) -> Any:
-    """Run a dam on rock whose sides are tied; the wet face ends at its heel."""
+def assemble_on_rock(comm: Any, *, follower: bool) -> tuple[Any, Any]:
+    """Return (system, tags) of a dam on rock whose sides are tied, with a wet face to its heel."""
     lower = BlockMesh(lengths=(60.0, 20.0), divisions=(6, 2))
     upper = BlockMesh(lengths=(20.0, 40.0), divisions=(2, 5))
     mesh, tags = fem.build_mesh(TwoBlocks(lower=lower, upper=upper, offset=(20.0,)), comm)
@@ -257,6 +259,12 @@ def march_on_rock(comm: Any, *, follower: bool) -> Any:
         tied=fem.Tied(*(sides[::-1] if follower else sides)),
         reservoir=wet,
     )
+    return system, tags
+
+
+def march_on_rock(comm: Any, *, follower: bool) -> Any:
+    """Run that dam."""
+    system, tags = assemble_on_rock(comm, follower=follower)
     system = laws.with_weight(system)
     surface = fem.contact_pair(system, tags["upper_bottom"], tags["lower_top"])
     shake = vc.Harmonic(amplitude=3.0, frequency=3.0, direction=(1.0, 0.0))
@@ -279,6 +287,23 @@ def test_a_dam_on_tied_rock(comm: Any) -> None:
         assert np.abs(h["energy_defect"]).max() < 1e-8 * h["work_input"].max()
         for name in ("energy_water", "loss_bottom", "water_force_x"):
             assert np.abs(h[name] - alone[name]).max() <= 1e-10 * np.abs(alone[name]).max()
+
+
+@pytest.mark.parametrize("follower", [False, True])
+def test_what_is_stored_is_symmetric(follower: bool) -> None:
+    """An entry that cancels stays stored: some orders of elimination do not end without it."""
+    system, _ = assemble_on_rock(MPI.COMM_SELF, follower=follower)
+    for matrix in (system.M, system.C, system.K):
+        stored = system.algebra.entries(matrix, np.arange(matrix.rows))
+        stored.data[:] = 1.0
+        assert (stored != stored.T).nnz == 0
+
+
+def test_a_sum_keeps_what_cancels() -> None:
+    one = sp.csr_matrix([[1.0, 2.0], [0.0, 3.0]])
+    other = sp.csr_matrix([[0.0, -2.0], [4.0, 1.0]])
+    both = add_entries(one, other)
+    assert both.nnz == 4 and np.array_equal(both.toarray(), [[1.0, 0.0], [4.0, 4.0]])
 
 
 def test_modes_and_stages_know_the_water(comm: Any) -> None:

@@ -26,7 +26,7 @@ from vi_contact.fem.matrices.petsc_algebra import (
     PetscMatrix,
     UnsymmetricAlgebra,
 )
-from vi_contact.fem.matrices.petsc_rows import aij_of
+from vi_contact.fem.matrices.petsc_rows import aij_of, rows_of
 from vi_contact.kernels import compiler
 from vi_contact.solvers import ReducedNewton, SemismoothNewton, TaoTron
 from vi_contact.solvers.volume.failures import make_petsc_failure
@@ -71,6 +71,30 @@ def last_step(problem: vc.ContactProblem, solver: Any) -> tuple[Any, Any]:
     r_n = problem.surface.everywhere(state.r_n)
     assert np.max(r_n) > 0.0
     return problem.cartesian(state.u), r_n
+
+
+def test_a_pattern_is_completed_for_nested_dissection(monkeypatch):
+    """PETSc's nested dissection may run for ever where (i, j) is stored and (j, i) is not."""
+    n = 6
+    first = n * COMM.rank
+    rows = np.arange(first, first + n)
+    size = n * COMM.size
+    below = rows[rows > 0]
+    entries = sp.csr_matrix(
+        (
+            np.concatenate([np.full(len(rows), 2.0), np.full(len(below), 1e-20)]),
+            (np.concatenate([rows, below]) - first, np.concatenate([rows, below - 1])),
+        ),
+        shape=(n, size),
+    )
+    mat = aij_of(entries, COMM)
+    assert direct.complete_pattern(mat) is mat or not EVERY("amd")
+
+    without(monkeypatch, "suitesparse")
+    whole = direct.complete_pattern(mat)
+    assert COMM.allreduce(rows_of(whole).nnz) == size + 2 * (size - 1)
+    factor = PetscAlgebra(COMM).factor(PetscMatrix(mat))
+    assert factor.solve(np.ones(n)) == pytest.approx(np.full(n, 0.5), rel=1e-14)
 
 
 SOLVERS = {

@@ -63,7 +63,7 @@ from .own_forms import Forms, OwnForms
 from .reservoir import Reservoir, add_water, list_pressures
 from .space import FemSpace, translations
 from .ties import Tied
-from .turning_forms import TurningForms
+from .turning_forms import TurningForms, refuse_beside_turning
 from .yielding_forms import YieldingForms
 
 Field = tuple[float, ...] | Callable[[Array], Array]
@@ -224,16 +224,17 @@ def assemble(
         degree=degree,
         quadrature_degree=quadrature_degree,
     )
-    add_water(reservoir, space, section.thickness)
+    if reservoir is not None:
+        add_water(reservoir, space, section.thickness)
     rigid = np.column_stack([space.restrict(motion) for motion in space.translations])
 
     # the body: weak forms of its materials or of the user, absorbing boundaries, loads
     materials = [] if material is None else cell_materials(mesh, material)
     if any(isinstance(given, YieldingMaterial) for _, given in materials):
         refuse_in_yielding(forms, conditions.loads)
-    make_body = _choose_forms(
-        forms, materials, conditions, integration=integration, stress=initial_stress
-    )
+    if any(isinstance(given, TURNING) for _, given in materials):
+        refuse_beside_turning(conditions.dashpots, conditions.loads)
+    make_body = _choose_forms(forms, materials, integration=integration, stress=initial_stress)
     body = make_body(space, materials=materials, section=section, damping=damping)
     body.boundaries = conditions.dashpots
     check_ratios(
@@ -367,7 +368,6 @@ def _add_boundary_loads(load: Load, reduced: "_Reduced", acting: list[Any]) -> L
 def _choose_forms(
     forms: Forms | None,
     materials: list[tuple[Any, Any]],
-    conditions: Conditions,
     *,
     integration: str,
     stress: Callable[[Array], Array] | None,
@@ -377,7 +377,6 @@ def _choose_forms(
     Args:
         forms: the user's own, or None.
         materials: pairs of local cells and a material.
-        conditions: what holds, damps and loads it.
         integration: "full", "selective" or "bbar".
         stress: that of a yielding body at the start, or None.
     """
@@ -385,7 +384,7 @@ def _choose_forms(
         return partial(OwnForms, given=forms)
     given = [material for _, material in materials]
     if any(isinstance(material, TURNING) for material in given):
-        return partial(TurningForms, conditions=conditions)
+        return TurningForms
     if any(isinstance(material, YieldingMaterial) for material in given):
         return partial(YieldingForms, integration=integration, initial_stress=stress)
     return partial(ElasticForms, selective=integration == "selective")

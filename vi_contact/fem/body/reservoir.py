@@ -284,15 +284,15 @@ class Reservoir:
         return AcousticWater(space, wet, data)
 
 
-def add_water(reservoir: Reservoir | None, space: FemSpace, thickness: float) -> None:
+def add_water(reservoir: Reservoir, space: FemSpace, thickness: float) -> None:
     """Give the unknowns of a body those of compressible water, if there is some. Collective.
 
     Args:
-        reservoir: the reservoir, or None.
+        reservoir: the reservoir.
         space: the body's unknowns, which are changed.
         thickness: of the section [m].
     """
-    if reservoir is not None and reservoir.model == "acoustic":
+    if reservoir.model == "acoustic":
         space.water = reservoir.make_water(space, thickness)
 
 

@@ -186,7 +186,6 @@ class TurningForms(ElasticForms):
         materials: list[tuple[Any, Any]],
         section: Section,
         damping: Damping,
-        conditions: Any,
     ) -> None:
         """Compile the forms. Collective.
 
@@ -195,15 +194,12 @@ class TurningForms(ElasticForms):
             materials: pairs of local cells and a material.
             section: that of the body.
             damping: the law of C.
-            conditions: what holds, damps and loads it (``conditions.Conditions``).
 
         Raises:
             InputError: materials that do not turn beside others that do, plane stress, damping
-                that resists rotation, sides that move together, and what else is of the undeformed
-                place alone.
+                that resists rotation, sides that move together.
         """
         refuse_with_turning([given for _, given in materials], section, damping, space)
-        refuse_beside_turning(conditions.dashpots, conditions.loads)
         super().__init__(space, materials, section, damping)
         energies = [find_energy(given, space.mesh) for _, given in materials]
         parts = _mark_cells(space, materials)

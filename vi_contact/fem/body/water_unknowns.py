@@ -127,7 +127,7 @@ class AcousticWater:
         """
         equations = self.equations
         if name == "M":
-            entries = self._couple() + self._stand_alone(equations.mass)
+            entries = add_entries(self._couple(), self._stand_alone(equations.mass))
         else:
             diagonal = equations.damping if name == "C" else equations.stiffness
             if matrix is None and not diagonal.any():
@@ -136,7 +136,7 @@ class AcousticWater:
         if matrix is not None:
             body = rows_of(matrix.mat)
             body.resize(entries.shape)
-            entries = entries + body
+            entries = add_entries(entries, body)
         return algebra.store(aij_of(entries, algebra.comm.mpi, entries.shape[0]))
 
     def _stand_alone(self, block: Array) -> sp.csr_matrix:
@@ -173,9 +173,23 @@ class AcousticWater:
         moves = np.flatnonzero(numbers >= 0)
         below = np.repeat(owned + np.arange(w), len(moves))
         columns = np.tile(numbers[moves], w)
-        return entries + self._rows(below, columns, coupling[moves].T.ravel())
+        return add_entries(entries, self._rows(below, columns, coupling[moves].T.ravel()))
 
     def _rows(self, rows: Indices, columns: Indices, values: Array) -> sp.csr_matrix:
         """Return owned rows with these entries."""
         shape = (len(self._space.ids), self._start + self.equations.count)
         return sp.csr_matrix((values, (rows, columns)), shape=shape)
+
+
+def add_entries(one: sp.csr_matrix, other: sp.csr_matrix) -> sp.csr_matrix:
+    """Return the sum of two sparse matrices, with every entry that either of them stores.
+
+    scipy's own sum leaves out entries that cancel. By rounding this may happen on one side of the
+    diagonal only, and a symmetric matrix would lose its symmetric pattern.
+    """
+    first = one.tocoo()
+    second = other.tocoo()
+    rows = np.concatenate([first.row, second.row])
+    columns = np.concatenate([first.col, second.col])
+    values = np.concatenate([first.data, second.data])
+    return sp.csr_matrix((values, (rows, columns)), shape=one.shape)

@@ -34,6 +34,23 @@ def ordering() -> str:
     return "amd" if packages.petsc_has("amd") else "nd"
 
 
+def complete_pattern(mat: Any) -> Any:
+    """Return a symmetric matrix that stores (j, i) wherever it stores (i, j). Collective.
+
+    Where an entry is zero by rounding, it may be stored on one side of the diagonal only. PETSc's
+    nested dissection does not end on some graphs of this kind, so it is given another matrix, which
+    has explicit zeros there. The order of elimination by SuiteSparse completes the graph by itself.
+    """
+    if ordering() != "nd":
+        return mat
+    other = mat.transpose(PETSc.Mat())
+    other.zeroEntries()
+    whole = mat.copy()
+    whole.axpy(1.0, other, structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+    other.destroy()
+    return whole
+
+
 def own_serves(mat: Any) -> bool:
     """Say whether PETSc's own factorisation is faster than MUMPS. Collective.
 

@@ -19,7 +19,7 @@ from ...core.algebra import Array, Factor, Indices, Mask, Matrix, build_identity
 from ...kernels.contact_last import ContactLast
 from ..mesh.communicators import MpiComm, give_back
 from .copied_factor import contact_last, make_product_of_rows
-from .direct import by_mumps, failure, finite, ordering, own_serves
+from .direct import by_mumps, complete_pattern, failure, finite, ordering, own_serves
 from .petsc_rows import aij_of, rows_of
 from .product_formats import copy_for_products
 
@@ -166,6 +166,9 @@ class PetscFactor:
                 MUMPS where PETSc has it.
         """
         mat = matrix.mat
+        by_blocks = by_mumps(mat, symmetric=symmetric, own=bool(PETSc.Options(PREFIX).getAll()))
+        if symmetric and not by_blocks:
+            mat = complete_pattern(mat)
         mat.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)
         kind = "cholesky" if symmetric else "lu"
         self._mat = mat
@@ -173,9 +176,7 @@ class PetscFactor:
         self._pc = PETSc.PC().create(mat.comm)
         self._pc.setOptionsPrefix(PREFIX)
         self._pc.setOperators(mat)
-        self._by_blocks = by_mumps(
-            mat, symmetric=symmetric, own=bool(PETSc.Options(PREFIX).getAll())
-        )
+        self._by_blocks = by_blocks
         defaults: dict[str, object] = {}
         if self._by_blocks:
             self._pc.setType(kind)

@@ -29,6 +29,8 @@ STICK = 2
 SLIP = 3
 # What lies at one place or in one plane may differ by this, over the size of what is drawn.
 SAME = 1e-6
+# Numbers from here on have no finite square: no run ends with them.
+LARGEST = float(np.sqrt(np.finfo(float).max))
 DAMAGED = "restore it, or draw without fields"
 FACING = 0.5  # least cosine between the contact direction of a node and the normals of its facets
 # (dimension, corners) -> kind of cell.
@@ -74,6 +76,8 @@ class StoredFrames:
                 stress = frame["von_mises"][:] if "von_mises" in frame else unknown
             if u.shape != (len(self.points), 3) or stress.shape != unknown.shape:
                 raise ValueError("the numbers of nodes or cells are not those of the mesh")
+            if not _is_sound(u) or not _is_sound(stress[~np.isnan(stress)]):
+                raise ValueError("displacements or stresses are infinite, or no numbers")
             return float(self.t[row]), u[:, : self.points.shape[1]], stress
 
     @cached_property
@@ -222,8 +226,11 @@ def read_frames(run: RunFolder | str | Path) -> StoredFrames:
     """
     folder = run.folder if isinstance(run, RunFolder) else Path(run)
     places = _list_places(folder)
+    contact = None
     if places:
-        history = run.history if isinstance(run, RunFolder) else read_run(folder).history
+        run = run if isinstance(run, RunFolder) else read_run(folder)
+        history = run.history
+        contact = run.contact
         times = dict(zip(history["k"].astype(int).tolist(), history["t"].tolist(), strict=True))
         # not those whose rows a killed run has lost
         places = {k: places[k] for k in sorted(places) if k in times}
@@ -235,7 +242,17 @@ def read_frames(run: RunFolder | str | Path) -> StoredFrames:
     if path.name != FIELDS_VTKHDF:
         path = path.with_name("mesh.h5")
     points, cells = _read_mesh(path)
+    if contact is not None and cells.shape[1] > 2 and contact.points.shape[1] != points.shape[1]:
+        raise InputError(
+            f"'{path}' has points of {points.shape[1]} coordinates, and contact points have "
+            f"{contact.points.shape[1]}: {DAMAGED}"
+        )
     return StoredFrames(points, cells, np.array([times[k] for k in places]), tuple(places.values()))
+
+
+def _is_sound(values: Array) -> bool:
+    """Return whether no value is infinite, NaN, or so large that its square is infinite."""
+    return bool(np.all(np.abs(values) < LARGEST))
 
 
 def has_frames(folder: Path) -> bool:
@@ -281,4 +298,8 @@ def _read_mesh(path: Path) -> tuple[Array, Indices]:
             raise ValueError("a cell has a point that is not there")
     vertices = VERTICES.get(cells.shape[1], cells.shape[1])
     d = 3 if np.any(points[:, 2]) else 2  # a mesh of the plane is stored with z = 0
+    if vertices > 2 and (d, vertices) not in CELLS:
+        raise InputError(
+            f"'{path}' is damaged (cells of {vertices} vertices in {d} dimensions): {DAMAGED}"
+        )
     return points[:, :d], cells[:, :vertices]
