@@ -48,6 +48,10 @@ ADVICE = (
 )
 
 
+class NotFound(StepFailure):
+    """Say that no balance was found; a law that is wrong is another failure, and no creep mends."""
+
+
 @dataclass(frozen=True)
 class Creep:
     """Solve increments with one viscosity.
@@ -127,7 +131,7 @@ class Creeping:
         for count in range(1, MOST + 1):
             try:
                 new = take(state, creep)
-            except StepFailure:
+            except NotFound:
                 # More viscosity has an answer sooner; with the most of it there is no way on.
                 if level == 0:
                     break
@@ -201,7 +205,7 @@ def _try(take: Take, state: State) -> State | None:
     """Return the equilibrium without viscosity; None where none is found. Collective."""
     try:
         return take(state, None)
-    except StepFailure:
+    except NotFound:
         return None
 
 

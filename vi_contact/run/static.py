@@ -36,7 +36,7 @@ from ..solvers.door import refuse_matrix, refuse_nan
 from ..solvers.joints import JointSolver
 from ..solvers.nonlinear import NonlinearSolver
 from . import joint_steps
-from .creeping import Creep, Creeping, may_creep
+from .creeping import Creep, Creeping, NotFound, may_creep
 from .materials import certify_material, keep_material, remember_material
 from .method import check_methods
 from .proximal import Proximal
@@ -256,7 +256,7 @@ class Equilibria:
 
         try:
             return take(old, None)
-        except StepFailure as failure:
+        except NotFound as failure:
             if self._creeping is None:
                 raise
             log.debug("%s", failure)
@@ -276,7 +276,10 @@ class Equilibria:
         system = problem.standing_at(old, name).static_load
         stage = self._pose_stage(old, t)
         step = pose(problem, stage, self._K, system)
-        certified = self.solver.solve(step) if creep is None else creep.solve(step)
+        try:
+            certified = self.solver.solve(step) if creep is None else creep.solve(step)
+        except StepFailure as failure:
+            raise NotFound(str(failure)) from failure
         answer = complete(stage, step, certified.result)
         state = _stand_still(problem, old, t, answer, certified.certificate)
         state = remember_material(system, state)
