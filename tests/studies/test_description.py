@@ -466,6 +466,8 @@ def test_steps_are_compared_with_periods_of_open_contact(shared_tmp: Path) -> No
             if "first natural period with the contact open" in one
         ]
         assert len(said) == count
+    model["run"]["steps"] = 0  # static stages alone
+    assert not [one for one in find_warnings(model) if "shorten [run] dt" in one]
     assert set(described(written(shared_tmp), COMM, "mesh.gap=0.1")) - set(model) == set()
 
 

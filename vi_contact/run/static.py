@@ -24,7 +24,7 @@ from ..core.algebra import EffectiveMatrix, largest, max_abs
 from ..core.certificate import Certificate
 from ..core.checks import describe_point, number, quote, real
 from ..core.collective import Parts, agree, together
-from ..core.errors import InputError
+from ..core.errors import InputError, StepFailure
 from ..core.joints import pose_joint
 from ..core.problem import ContactProblem
 from ..core.stage import Affine, Answer, Stage, complete, pose
@@ -36,6 +36,7 @@ from ..solvers.door import refuse_matrix, refuse_nan
 from ..solvers.joints import JointSolver
 from ..solvers.nonlinear import NonlinearSolver
 from . import joint_steps
+from .creeping import Creep, Creeping, NotFound, may_creep
 from .materials import certify_material, keep_material, remember_material
 from .method import check_methods
 from .proximal import Proximal
@@ -178,6 +179,9 @@ class Equilibria:
             self.solver = Settling(*given, advice=ADVICE_FLOATING)
         else:
             self.solver = NonlinearSolver(*given, advice=ADVICE_NONLINEAR)
+        self._creeping: Creeping | None = None
+        if may_creep(problem):
+            self._creeping = Creeping(problem, self._K, [solver], tolerance)
 
         # Passes of a joint: on the contact unknowns, where the stage is one step.
         first = self.solver.first if isinstance(self.solver, CertifiedSolver) else None
@@ -245,13 +249,37 @@ class Equilibria:
             old: the state before.
             t: the time [s].
         """
+
+        def take(start: State, creep: Creep | None) -> State:
+            """Return the state at the end of an increment to the time of the stage."""
+            return self._take_increment(start, t, creep)
+
+        try:
+            return take(old, None)
+        except NotFound as failure:
+            if self._creeping is None:
+                raise
+            log.debug("%s", failure)
+        return self._creeping.find(take, old)
+
+    def _take_increment(self, old: State, t: float, creep: Creep | None) -> State:
+        """Return the state at the end of an increment of a body that is not linear.
+
+        Args:
+            old: the state before.
+            t: the time [s] at its end.
+            creep: solves it with viscosity; None without.
+        """
         problem = self._problem
         name = "static_load"
         old = keep_material(problem.standing_at(old, name).static_load, old, old)
         system = problem.standing_at(old, name).static_load
         stage = self._pose_stage(old, t)
         step = pose(problem, stage, self._K, system)
-        certified = self.solver.solve(step)
+        try:
+            certified = self.solver.solve(step) if creep is None else creep.solve(step)
+        except StepFailure as failure:
+            raise NotFound(str(failure)) from failure
         answer = complete(stage, step, certified.result)
         state = _stand_still(problem, old, t, answer, certified.certificate)
         state = remember_material(system, state)

@@ -160,7 +160,10 @@ def _find_coarse_meshes(model: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _find_long_steps(model: Mapping[str, Any]) -> Iterator[str]:
-    """Tell of time steps that are too long."""
+    """Tell of time steps that are too long; static stages take none."""
+    if model["run"]["steps"] == 0:
+        return
+
     # Time steps too long for the passage of a layer.
     for layer in model["layers"]:
         if model["run"]["dt"] > layer["passage"] / PASSAGE:
