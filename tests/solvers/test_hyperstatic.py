@@ -113,7 +113,6 @@ def test_all_states_of_a_node(kind, mu, count):
         assert min(apart) < 1e-8, (seed, apart, found)
 
 
-<<<<<<< HEAD
 @pytest.mark.parametrize("slip", [0.5, -0.5])
 def test_a_split_that_loads_a_sliding_point_makes_it_rub(slip):
     """A closed point slides without force, the other two of its ring stick: what the least split
@@ -134,7 +133,8 @@ def test_a_split_that_loads_a_sliding_point_makes_it_rub(slip):
         assert abs(found[2, 1] - np.sign(slip) * node.mu[2] * found[2, 0]) < 1e-12 * size
         loaded += found[2, 0] > 1e-6 * size
     assert loaded >= 5
-=======
+
+
 def test_several_displacements_of_a_ring_with_unlike_friction():
     """Both stones of a course slip under a stone that holds its neighbour: what each of the two
     joints carries is not determined, and so the friction of both is not where their mu differ.
@@ -172,7 +172,6 @@ def violation(node: Node, r: Array) -> float:
         np.abs(limit * w[:, 1] + np.abs(w[:, 1]) * r[:, 1]),
     ]
     return float(np.max(misses))
->>>>>>> ties
 
 
 @pytest.mark.parametrize("kind", ["two walls", "three walls", "ring", "crossing"])
