@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -89,6 +90,14 @@ def test_water_that_lifts_the_block_says_uplift(comm: Any) -> None:
     """A level at which no part of the base stays closed."""
     problem = rigid(comm, 12, replace(WATER, level=1.6 * HEIGHT))
     with pytest.raises(StepFailure, match="uplift: the water follows"):
+        vc.static_equilibrium(problem)
+
+
+@pytest.mark.parametrize("factor", [-0.5, math.nan, math.inf])
+def test_a_factor_that_no_water_has_is_refused(comm: Any, factor: float) -> None:
+    """A negative one would hold the joint together, without a word."""
+    problem = rigid(comm, 12, replace(WATER, history=lambda t: factor))
+    with pytest.raises(InputError, match="JointWater: history is .* return a factor of 0 or more"):
         vc.static_equilibrium(problem)
 
 

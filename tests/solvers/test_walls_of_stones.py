@@ -248,6 +248,22 @@ def test_a_factor_without_digits_is_made_again() -> None:
     assert np.abs(J @ x - right).max() < 1e-8 * np.abs(right).max()
 
 
+@pytest.mark.serial
+def test_a_singular_problem_after_a_regular_one_is_told() -> None:
+    """All rows become zero, and one of them is said to have changed."""
+    m = 4
+    fronts = Fronts(sp.identity(m, format="csr"), dissect(sp.identity(m).tocsr(), np.eye(m)), 1)
+    kept = KeptFactor(fronts)
+    nothing = np.zeros((m, 1, 1))
+    marks = np.zeros((m, 1))
+    right = np.arange(1.0, m + 1.0)
+    regular = Jacobian(sp.identity(m, format="csr"), nothing, nothing + 1.0)
+    assert kept.solve(regular, right, marks) == pytest.approx(right)
+    marks = marks.copy()
+    marks[0] = 1.0
+    assert kept.solve(Jacobian(regular.G, nothing, nothing), right, marks) is None
+
+
 def make_fronts(side: int) -> Fronts:
     """Fronts of a bonded wall of so many stones along each side, two conditions a joint."""
     stone = np.arange(side * side).reshape(side, side)

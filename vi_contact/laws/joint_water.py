@@ -30,6 +30,7 @@ import numpy as np
 from ..core.algebra import Array, Indices, largest
 from ..core.arguments import check_fields
 from ..core.checks import quote
+from ..core.collective import keep_error
 from ..core.errors import InputError
 from ..core.joint_laws import Committed
 from ..core.quantities import RATIO, Between, Finite, NotNegative, Positive, Unit
@@ -256,12 +257,24 @@ class PlacedWater(JointWater):
             tip: place of the tip of the crack.
             share: to which points are filled (m,).
         """
-        factor = 1.0
-        if self.history is not None:
-            factor = evaluate_history(self.history, self.time)
+        factor = self._find_factor()
         linear = np.maximum(self.find_head(self.xi, tip) - self.height, 0.0)
         full = np.maximum(self.level - self.height, 0.0)
         return np.asarray(factor * self.gamma * np.maximum(linear, share * full))
+
+    def _find_factor(self) -> float:
+        """Return the factor of all pressures at the time.
+
+        Raises:
+            InputError: it is negative, NaN or infinite; in a frame of several ranks at its end.
+        """
+        if self.history is None:
+            return 1.0
+        factor = evaluate_history(self.history, self.time)
+        if 0.0 <= factor < np.inf:
+            return factor
+        what = f"JointWater: history is {factor:g} at t = {self.time:g} s"
+        return keep_error(what, InputError(f"{what}: return a factor of 0 or more"), 0.0)
 
     def _stand(self, g: Array) -> dict[str, Array]:
         """Return the committed arrays of a static stage with openings (m,) [m]. Collective."""

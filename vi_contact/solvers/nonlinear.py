@@ -361,7 +361,9 @@ class NonlinearSolver:
             return
         system = self._problem.system
         far = system.algebra.dot(x, x)
-        if far > FAR**2 * system.algebra.dot(walk.here.d, walk.here.d):
+        gone = system.algebra.dot(walk.here.d, walk.here.d)
+        # the first way from the beginning of a step may have any length
+        if gone > 0.0 and far > FAR**2 * gone:
             raise StepFailure("a tangent leads too far")
 
     def _take_tangent(self, walk: Walk) -> None:
