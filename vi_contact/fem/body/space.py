@@ -244,6 +244,11 @@ class FemSpace(NodalSpace):
         """Return the owned blocks (nodes) on the facets, wherever the facets are owned."""
         return compat.locate_owned_blocks(self.V, facets)
 
+    @cached_property
+    def _names(self) -> Indices:
+        """Return the numbers of the local geometry nodes. Collective when first asked."""
+        return node_numbers(self.mesh)
+
     def corners_of_facets(self, facets: Any) -> Indices:
         """Return the numbers (k, n) of the nodes of facets that may have contact conditions.
 
@@ -254,7 +259,7 @@ class FemSpace(NodalSpace):
         """
         if self.degree == 1:
             vertices = compat.entities_to_geometry(self.mesh, self.mesh.topology.dim - 1, facets)
-            return node_numbers(self.mesh)[vertices]
+            return self._names[vertices]
         nodes = self.node_of_block[facet_rows(self.V, facets)]
         # vertices come first: as many as a facet of a tetrahedron has
         return nodes if self.hierarchy is None else nodes[:, : self.dimension]

@@ -27,11 +27,12 @@ from .corner_points import find_corner_points
 from .facing import Sights, find_sights, group_pairs
 from .joined import joined_surfaces
 from .joint_list import NAMED, Joint, Joints
+from .known_sides import know_sides
 from .matching import Matching, NodeToNode
 from .merged_joints import merge_joints
 from .mortar import DualMortar
 from .overlaps import find_deepest, refuse_overlaps
-from .pairs import contact_pair
+from .pairs import make_pair
 from .skin import Skin, gather_skin
 
 log = logging.getLogger(__name__)
@@ -129,17 +130,22 @@ def contact_pairs(
     Raises:
         InputError: on all ranks, what ``find_joints`` and ``contact_pair`` refuse; no joints.
     """
-    space_of("contact_pairs", system)
+    space: FemSpace = space_of("contact_pairs", system)
     joints = find_joints(system, within=within, between=between, tags=tags)
     if not len(joints):
         raise InputError(
             f"contact_pairs: no two bodies touch within {within:g} m: give within= a larger gap, "
             "or look at the mesh, where bodies may share nodes (meshes.CutApart)"
         )
+    pairs = list(merge_joints(joints, matching))
+    # with absent bodies each pair keeps other facets, and is integrated by itself
+    known = None
+    if space.absent is None:
+        known = know_sides(space, [side for pair in pairs for side in pair[:2]])
     surfaces = []
-    for facets1, facets2, alike in merge_joints(joints, matching):
-        usual = NodeToNode() if alike else DualMortar()
-        surfaces.append(contact_pair(system, facets1, facets2, matching=matching or usual))
+    for facets1, facets2, alike in pairs:
+        way = matching or (NodeToNode() if alike else DualMortar())
+        surfaces.append(make_pair(system, facets1, facets2, matching=way, known=known))
     return joined_surfaces(*surfaces)
 
 

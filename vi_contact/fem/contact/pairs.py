@@ -43,6 +43,7 @@ from .covering import LEAST_SHARE
 from .faces import check_angle, gather_boundary, split_at_corners, tell_corners
 from .frames import snap_to_axes, surface_of
 from .hinges import find_hinges, refuse_hinges
+from .known_sides import KnownSides
 from .matching import Matched, Matching, NodeToNode, Side
 from .nodes import Nodes, everywhere, join_nodes
 from .present import is_there, keep_present
@@ -60,7 +61,6 @@ from .watching import Watched, sort_held, watch_nodes
 log = logging.getLogger(__name__)
 
 
-@report_time("contact")
 def contact_pair(
     system: SemiDiscreteSystem,
     facets1: Facets,
@@ -109,6 +109,44 @@ def contact_pair(
             each other, bodies that overlap, sides of one and the same boundary, contact directions
             that are partly prescribed, clamped nodes that face free ones.
     """
+    return make_pair(
+        system,
+        facets1,
+        facets2,
+        matching=matching,
+        points=points,
+        feature_angle=feature_angle,
+        hinges=hinges,
+    )
+
+
+@report_time("contact")
+def make_pair(
+    system: SemiDiscreteSystem,
+    facets1: Facets,
+    facets2: Facets,
+    *,
+    matching: Matching | None = None,
+    points: Sequence[Sequence[float]] | None = None,
+    feature_angle: float = FEATURE_ANGLE,
+    hinges: bool = False,
+    known: KnownSides | None = None,
+) -> ContactSurface:
+    """Make the conditions of ``contact_pair``, with what is known of many sides. Collective.
+
+    Args:
+        system: the system of both bodies.
+        facets1: side 1.
+        facets2: side 2.
+        matching: how nodes find what they face.
+        points: a list of coordinates, or None.
+        feature_angle: [rad].
+        hinges: whether bodies may hang together by nodes.
+        known: integrals and hinges of these sides among others; None: they are found here.
+
+    Raises:
+        InputError: as ``contact_pair``.
+    """
     space, angle = _check_pair(system, facets1, facets2, points, matching, feature_angle)
     flag("contact_pair", "hinges", hinges)
     if matching is None:
@@ -120,8 +158,8 @@ def contact_pair(
         return empty_surface(space.comm, space.dimension)
 
     # what faces what: nodes of both sides, and of each face of side 1 what it has in front
-    side1, side2, shared = _two_sides(space, facets1, facets2)
-    hinge = _mark_hinges(space, side1, side2, shared, allowed=hinges)
+    side1, side2, shared = _two_sides(space, facets1, facets2, known)
+    hinge = _mark_hinges(space, side1, side2, shared, allowed=hinges, known=known)
     side1 = replace(side1, tied=_find_tied_over(space, side1, side2))
     faces = _divide_faces(space, facets1, side1, angle)
     with together(space.comm):  # a matching of the user's may fail on one rank
@@ -234,19 +272,22 @@ def _check_pair(
     return space, angle
 
 
-def _two_sides(space: FemSpace, facets1: Facets, facets2: Facets) -> tuple[Side, Side, Mask]:
+def _two_sides(
+    space: FemSpace, facets1: Facets, facets2: Facets, known: KnownSides | None
+) -> tuple[Side, Side, Mask]:
     """Return both sides, and a mask of the nodes of side 1 that side 2 has too. Collective.
 
     Args:
         space: the bodies' unknowns.
         facets1: side 1.
         facets2: side 2.
+        known: what is known of many sides, or None.
 
     Raises:
         InputError: sides of the same nodes, and a facet on both sides: nothing can part there.
     """
-    side1 = side_of(space, facets1)
-    side2 = side_of(space, facets2)
+    side1 = side_of(space, facets1, known)
+    side2 = side_of(space, facets2, known)
     shared = np.isin(side1.nodes.numbers, side2.nodes.numbers)
     if shared.all():
         raise InputError(
@@ -282,12 +323,18 @@ def _pick_listed(
     return nodes.pick(rows), matched.pick(rows), others
 
 
-def side_of(space: FemSpace, facets: Facets) -> Side:
+def side_of(space: FemSpace, facets: Facets, known: KnownSides | None = None) -> Side:
     """Gather a boundary on every rank: nodes in the order of their numbers, each facet once.
 
     Collective.
+
+    Args:
+        space: the bodies' unknowns.
+        facets: the boundary.
+        known: what is known of many sides, or None.
     """
-    nodes = everywhere(space.comm, nodes_on(space, facets))
+    integrals = None if known is None else known.find_integrals(facets)
+    nodes = everywhere(space.comm, nodes_on(space, facets, integrals))
     rows = np.concatenate(
         space.comm.bcast(space.comm.gather(space.corners_of_facets(facets.indices)))
     )
@@ -459,7 +506,15 @@ def _borrow(
     return borrow(space, facets, side1.nodes.numbers[without], having)
 
 
-def _mark_hinges(space: FemSpace, side1: Side, side2: Side, shared: Mask, *, allowed: bool) -> Mask:
+def _mark_hinges(
+    space: FemSpace,
+    side1: Side,
+    side2: Side,
+    shared: Mask,
+    *,
+    allowed: bool,
+    known: KnownSides | None,
+) -> Mask:
     """Return a mask (m,) of the nodes of side 1 that only glue bodies together. Collective.
 
     Args:
@@ -468,13 +523,18 @@ def _mark_hinges(space: FemSpace, side1: Side, side2: Side, shared: Mask, *, all
         side2: side 2.
         shared: (m,) nodes of both sides.
         allowed: whether bodies may hang together so.
+        known: what is known of many sides, or None.
 
     Raises:
         InputError: there are some, and they are not ``allowed``.
     """
     numbers = np.union1d(side1.nodes.numbers, side2.nodes.numbers)
     clamped = [side.nodes.numbers[side.nodes.held.all(axis=1)] for side in (side1, side2)]
-    hinges = find_hinges(space, np.setdiff1d(numbers, np.concatenate(clamped)))
+    asked = np.setdiff1d(numbers, np.concatenate(clamped))
+    if known is None:
+        hinges = find_hinges(space, asked)
+    else:
+        hinges = np.intersect1d(asked, known.hinges)
     here = np.isin(side1.nodes.numbers, hinges)
     if not allowed:
         refuse_hinges("contact_pair", (side1.name, side2.name), side1.nodes.points[here & shared])

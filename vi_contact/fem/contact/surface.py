@@ -464,15 +464,20 @@ def contact_space(
     return space
 
 
-def nodes_on(space: FemSpace, facets: Facets) -> Nodes:
+def nodes_on(space: FemSpace, facets: Facets, integrals: Array | None = None) -> Nodes:
     """Return this rank's nodes of the facets, ordered by their numbers. Collective.
 
     Their weights are ∫ phi_i, their normals have the direction of ∫ phi_i n over the facets.
 
+    Args:
+        space: the body's unknowns.
+        facets: the boundary.
+        integrals: ``integrate_nodal`` of the facets where it is known, or None.
+
     Raises:
         InputError: on all ranks, facets without nodes, and facets inside of the body.
     """
-    values = integrate_nodal(space, facets.indices)
+    values = integrate_nodal(space, facets.indices) if integrals is None else integrals
     blocks = space.facet_blocks(facets.indices)
     if space.hierarchy is not None:
         blocks = np.intersect1d(blocks, space.hierarchy.vertices[1])

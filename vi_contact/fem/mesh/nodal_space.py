@@ -5,6 +5,7 @@ matrices (``matrices.own_matrices``) alike. ``parts_of`` finds bodies, and other
 together over ranks.
 """
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -74,11 +75,16 @@ class NodalSpace:
         """Return the numbers of the nodes that these follow: their own, where nothing is tied."""
         return nodes
 
+    @cached_property
+    def _order(self) -> Indices:
+        """Return the places of the owned nodes in the order of their numbers."""
+        return np.argsort(self.nodes)
+
     def blocks_of(self, nodes: Indices) -> Indices:
         """Return the place (k,) of each node number among the owned nodes, -1 of other ranks'."""
         if not len(self.nodes):
             return np.full(len(nodes), -1)
-        order = np.argsort(self.nodes)
+        order = self._order
         blocks = order[np.minimum(np.searchsorted(self.nodes, nodes, sorter=order), len(order) - 1)]
         return np.where(self.nodes[blocks] == nodes, blocks, -1)
 
