@@ -227,7 +227,12 @@ def gather_frame_data(parts: Sequence[NodalConditions]) -> tuple[Indices, Array,
 
 
 def surface_of(
-    space: NodalSpace, parts: Sequence[NodalConditions], *, traced: bool = False, **data: Any
+    space: NodalSpace,
+    parts: Sequence[NodalConditions],
+    *,
+    traced: bool = False,
+    joins: bool = False,
+    **data: Any,
 ) -> FemSurface:
     """Make the surface of conditions, one part after the other. Collective.
 
@@ -235,6 +240,8 @@ def surface_of(
         space: what the unknowns mean.
         parts: this rank's m conditions.
         traced: whether they are traces also where each could have an unknown of its own.
+        joins: whether the surface is only to be joined to others: ``joined_surfaces`` makes the
+            matrices of all unknowns anew, and this surface has none.
         **data: gap0 (m,), weights (m,) and whatever else a ``ContactSurface`` holds of them.
 
     Raises:
@@ -263,12 +270,16 @@ def surface_of(
     column = frames.column
     count = len(slots)
     tangents = np.take_along_axis(index[place], list_tangential_columns(column, d), axis=1)
-    turn = _make_turn(space, frames.turns, index)
+    turn = None
     dual = None
-    if largest(comm, frames.oblique):
-        dual = _make_turn(space, frames.blocks, index)
-    if space.hierarchy is not None:
-        turn, dual = space.hierarchy.around(turn, turn if dual is None else dual)
+    coupling = None
+    if not joins:
+        turn = _make_turn(space, frames.turns, index)
+        if largest(comm, frames.oblique):
+            dual = _make_turn(space, frames.blocks, index)
+        if space.hierarchy is not None:
+            turn, dual = space.hierarchy.around(turn, turn if dual is None else dual)
+        coupling = _make_coupling(space, parts, frames, index)
     return FemSurface(
         comm=comm,
         points=frames.points,
@@ -279,7 +290,7 @@ def surface_of(
         basis=turn,
         dual=dual,
         nodes=frames.numbers[place],
-        coupling=_make_coupling(space, parts, frames, index),
+        coupling=coupling,
         space=space,
         parts=tuple(parts),
         **{"bilateral": np.zeros(count, dtype=bool), "compliance": np.zeros(count)} | data,

@@ -142,7 +142,8 @@ def make_pair(
         points: a list of coordinates, or None.
         feature_angle: [rad].
         hinges: whether bodies may hang together by nodes.
-        known: integrals and hinges of these sides among others; None: they are found here.
+        known: integrals and hinges of these sides among others, of pairs that will be joined; None:
+            they are found here.
 
     Raises:
         InputError: as ``contact_pair``.
@@ -214,6 +215,7 @@ def make_pair(
         weights=nodes.weights * space.forms.section.thickness,
         censuses=(census,),
         watched=watched,
+        joins=known is not None,
     )
     if some_uncovered:
         surface = replace(surface, uncovered=uncovered)
