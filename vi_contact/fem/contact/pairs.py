@@ -533,10 +533,8 @@ def _mark_hinges(
     numbers = np.union1d(side1.nodes.numbers, side2.nodes.numbers)
     clamped = [side.nodes.numbers[side.nodes.held.all(axis=1)] for side in (side1, side2)]
     asked = np.setdiff1d(numbers, np.concatenate(clamped))
-    if known is None:
-        hinges = find_hinges(space, asked)
-    else:
-        hinges = np.intersect1d(asked, known.hinges)
+    every = find_hinges(space, asked) if known is None else known.hinges
+    hinges = np.intersect1d(asked, every)
     here = np.isin(side1.nodes.numbers, hinges)
     if not allowed:
         refuse_hinges("contact_pair", (side1.name, side2.name), side1.nodes.points[here & shared])
