@@ -409,7 +409,7 @@ def _gather_companions(
             "linear: give 'incompressible' or 'added mass'"
         )
     companions = [companion for part in (*prescribed, *acting) for companion in part.companions]
-    if companions and body.internal is not None:
+    if companions and body.internal is not None and not body.takes_companions:
         raise InputError(
             f"{body.nonlinear} does not go with motions that are marched beside the run, such as "
             "a free field, as these are linear: take fem.Dashpots there"
