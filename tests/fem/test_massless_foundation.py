@@ -3,6 +3,7 @@ crack and slide between them."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -194,3 +195,16 @@ def test_a_rough_start_is_told(caplog: pytest.LogCaptureFixture) -> None:
     assert rough not in caplog.text
     vc.simulate(problem, dt=DT, steps=2, progress=False)
     assert (rough in caplog.text) == (MPI.COMM_WORLD.rank == 0)
+
+
+@pytest.mark.serial
+def test_many_runs_are_single_runs() -> None:
+    """Two strengths of the motion, marched together."""
+    problem = block(0.0, joint=None, friction=vc.Coulomb(0.7))
+    motions = [vc.Harmonic(size, 3.0) for size in (1.0, 3.0)]
+    problems = [replace(problem, excitation=motion) for motion in motions]
+    rest = vc.static_equilibrium(problem)
+    settings = {"dt": DT, "steps": 20, "state": rest, "progress": False}
+    runs = [{"problem": one, **settings} for one in problems]
+    for number, run in vc.simulate_many(runs):
+        assert max(distance(march(problems[number], 20), run).values()) < 1e-10
