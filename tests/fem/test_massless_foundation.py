@@ -163,7 +163,7 @@ def test_ranks_change_nothing() -> None:
 @pytest.mark.parametrize(
     ("others", "said"),
     [
-        ({"mass": vc.Redistributed()}, "hands mass|cannot be moved"),
+        ({"mass": vc.Redistributed()}, "rho = 0, and redistributed mass needs"),
         ({"scheme": vc.SS22()}, "a material has rho = 0, and this scheme needs mass in all bodies"),
         ({"scheme": vc.Trapezoidal(), "mass": vc.ConsistentMass()}, "rho = 0, and this scheme"),
         ({"scheme": vc.MoreauJean()}, "rho = 0, and this scheme"),
