@@ -690,9 +690,7 @@ def test_case_files_know_the_public_names() -> None:
     others = {
         "Geostatic",
         "JointWater",
-        "NeoHookean",
         "Prestress",
-        "SaintVenantKirchhoff",
         "ExponentialDecay",
         "StaticKinetic",
         "RateIteration",

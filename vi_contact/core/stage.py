@@ -272,9 +272,17 @@ class NonlinearForces:
         """Return what is left of the forces at an increment (n,): b - A d of a linear body."""
         return find_rest(self.system, self.stage, d)[0]
 
-    def find_internal(self, d: Array) -> Array:
-        """Return the internal force (n,) at an increment (n,), in the unit of b."""
-        return self.stage.scale * self.stage.find_internal(self.system, d)
+    def measure(self, d: Array) -> tuple[Array, Array, Array]:
+        """Return what is left of the forces at an increment (n,), and what it is compared with.
+
+        Returns:
+            What is left, the sizes of the forces that act, and the internal force: (n,) each, in
+            the unit of b. Sizes are those of the load, and of inertia and reactions together: in
+            free flight the load alone is more than rounding.
+        """
+        rest, internal = find_rest(self.system, self.stage, d)
+        acting = np.maximum(np.abs(self.stage.scale * self.stage.load), np.abs(rest + internal))
+        return rest, acting, internal
 
     def find_start(self) -> Array | None:
         """Return the increment (n,) at which passes begin; None for zero."""

@@ -424,12 +424,13 @@ class NonlinearSolver:
         """
         whole = walk.whole
         d = add_increment(walk.here.d, whole.bound, whole.slip0, posed, result)
-        rest = walk.forces.find_rest(d)
         answer = replace(result, x=d)
         if walk.forces.turns:
             # Forces of the guess, a straight way, may be a thousand times those of the answer.
-            internal = walk.forces.find_internal(d)
-            whole = replace(whole, b=rest + internal, internal=internal)
+            rest, acting, internal = walk.forces.measure(d)
+            whole = replace(whole, b=acting, internal=internal)
+        else:
+            rest = walk.forces.find_rest(d)
         certificate = kkt_residual(whole, answer, rest)
         return Pass(answer, certificate, walk.escalated, Place(d, rest, result.active))
 

@@ -13,6 +13,7 @@ from ...core.algebra import Array
 from ...core.checks import provides
 from ...core.errors import InputError
 from ...core.units import STANDARD_GRAVITY
+from ..engineering.column_groups import begins
 from ..engineering.floor_spectra import recorded_motion
 from ..ground_motion.processing import filtered
 from ..ground_motion.record import Record
@@ -28,7 +29,7 @@ from .histories import (
     scale_values,
 )
 from .records import SAMPLES_A_PERIOD
-from .report_words import CHARTS_OF_THE_WHOLE, begins
+from .report_words import CHARTS_OF_THE_WHOLE
 
 # What is no more than this is nothing: a term of energy over the largest one, and the range of a
 # column over its size.

@@ -19,8 +19,6 @@ SUMMARY = {
     "worst certificate": "{worst}",
     "energy defect": "{energy_defect}",
 }
-# Columns of the recorder Uplift, which are forces of water, and no open shares of parts.
-FORCES_OF_WATER = ("uplift_force", "uplift_effective")
 # Charts of histories: title -> beginnings of columns; of these the first that move.
 CHARTS = {
     "thrust, normal force": ("N_", "contact_resultant", "contact_force_"),
@@ -149,8 +147,3 @@ SAY = {
         "{defect:.1e} of the largest energy ({most:.4g} J)."
     ),
 }
-
-
-def begins(column: str, prefixes: tuple[str, ...]) -> bool:
-    """Say whether a column begins with one of the prefixes; a force of water is asked for whole."""
-    return column in prefixes if column in FORCES_OF_WATER else column.startswith(prefixes)

@@ -17,6 +17,7 @@ from ...core.units import STANDARD_GRAVITY
 from ...run.files.reading import RunFolder
 from ...run.recorders.contact_parts import is_upright
 from ...run.solution import energy_warning
+from ..engineering.column_groups import begins
 from ..engineering.peak_values import peaks
 from ..units.report_units import ReportUnits, write_number
 from . import charts
@@ -30,7 +31,6 @@ from .report_words import (
     RESULTS,
     SAY,
     SUMMARY,
-    begins,
 )
 
 # What of a part that stands upright says nothing: its thrust has a height in place of e.

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...core.algebra import Array
 from ...run.recorders.contact_parts import is_upright
-from ..plots.report_words import begins
+from ..engineering.column_groups import begins
 
 History = Mapping[str, Array]  # column -> values (rows,)
 Names = Collection[str]
