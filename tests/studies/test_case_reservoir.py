@@ -151,6 +151,8 @@ def test_a_stage_has_its_own_level(shared_tmp: Path) -> None:
         ('silt = "2 m"', 'slit = "2 m"', r"unknown key 'slit' for Reservoir: did you mean silt"),
         ('toe = ["6 m"', 'toe = ["-6 m"', r"\[contact\[1\].joint\] JointWater: heel .* not the e"),
         ('cohesion = "300 kPa"', 'cohesion = "1e5*(x-3)"', r"\[contact\[1\].joint\] Joint: the c"),
+        ('silt = "2 m"', "silt_ratio = 0.4", r"\[reservoir\] silt_ratio is of silt, and there is"),
+        ('drain = "1 m"', "efficiency = 0.5", r"water\] efficiency is of drains, and there are n"),
         ('face = "left"', 'face = "lefft"', r"\[reservoir\] face is 'lefft'"),
     ],
 )

@@ -172,7 +172,13 @@ class ContactProblem:
     def _make_relative(self, system: SemiDiscreteSystem) -> SemiDiscreteSystem:
         """Return the system in unknowns relative to the other side, where there is one."""
         coupling = self.surface.coupling
-        return system if coupling is None else system.in_relative(coupling)
+        relative = system if coupling is None else system.in_relative(coupling)
+        if not system.has_massless_bodies:
+            return relative
+
+        # A node without mass has that of the node which moves relative to it in its own row.
+        massless = system.massless & (relative.M.diagonal() == 0.0)
+        return relative.changed(massless=massless)
 
     def standing_at(self, state: Any, name: str = "equations") -> "ContactProblem":
         """Return the same problem whose materials go on from a state. Collective.

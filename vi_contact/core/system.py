@@ -234,6 +234,8 @@ class SemiDiscreteSystem:
         space: what the unknowns mean.
         massless: unknowns without inertia (rows and columns of M are zero), None when there are
             none.
+        has_massless_bodies: True when ``massless`` names whole bodies or parts of them, and not a
+            layer at the contact.
         floating: True when some rigid motion is not held by prescribed displacements (static stages
             refuse it).
         tied: unknowns of nodes that move together with others elsewhere, None when there are none:
@@ -260,6 +262,7 @@ class SemiDiscreteSystem:
     space: Space
     floating: bool = False
     massless: Mask | None = None
+    has_massless_bodies: bool = False
     base_mass: Array | None = None
     tied: Mask | None = None
     notes: tuple[str, ...] = ()

@@ -65,8 +65,9 @@ class Redistributed:
     negative on curved ones: those want lumping 0. P2 tetrahedra are not lumped: their vertices
     would bear it all, and frequencies fall by per cents.
 
-    InputError is raised for lumping outside [0, 1] or above 0 with negative row sums, for a contact
-    node with no material behind it, and for a mesh too coarse to hold the inertia.
+    InputError is raised for lumping outside [0, 1] or above 0 with negative row sums, for bodies
+    without mass, for a contact node with no material behind it, and for a mesh too coarse to hold
+    the inertia.
 
     Attributes:
         lumping: share of the lumped mass, from 0 (consistent) to 1.
@@ -94,6 +95,12 @@ class Redistributed:
         """
         if surface.total == 0:
             return system
+        if system.has_massless_bodies:
+            raise InputError(
+                "a material has rho = 0, and redistributed mass needs mass in all bodies: take "
+                "ZienkiewiczWoodTaylor() or Midpoint() with mass=ConsistentMass(), or give a "
+                "density above zero"
+            )
         massless, contact = _mark_contact_unknowns(system, surface, tangential)
         algebra = system.algebra
         diagonal = system.M.diagonal()

@@ -27,7 +27,8 @@ class LinearElastic:
     Attributes:
         E: Young's modulus [Pa].
         nu: Poisson's ratio.
-        rho: mass density [kg/m³].
+        rho: mass density [kg/m³]; 0 for a body without mass, such as a massless foundation
+            (docs/guide/dams.md).
         xi: damping ratio at the frequency of ``DampingRatio``, the one law that reads it.
     """
 
@@ -44,7 +45,7 @@ class LinearElastic:
         RATIO,
         "Poisson's ratio nu",
     ]
-    rho: Density
+    rho: Annotated[float, NotNegative, Unit("kg/m³"), "the mass density rho"]
     xi: DampedBy = 0.0
 
     def __post_init__(self) -> None:
@@ -55,7 +56,8 @@ class LinearElastic:
                 "xi) where they change from place to place"
             )
         check_fields(self)
-        if not (EXTREME**-1 <= self.E <= EXTREME and EXTREME**-1 <= self.rho <= EXTREME):
+        rho = self.rho or 1.0  # zero is a body without mass
+        if not (EXTREME**-1 <= self.E <= EXTREME and EXTREME**-1 <= rho <= EXTREME):
             raise InputError(
                 f"LinearElastic: no material has E = {self.E:g} Pa and rho = {self.rho:g} kg/m³; "
                 f"give numbers between {1.0 / EXTREME:g} and {EXTREME:g}"
@@ -109,13 +111,17 @@ class LinearElastic:
     def c_p(self) -> float:
         """Return the pressure wave speed sqrt((lame_lambda + 2 shear_modulus) / rho) [m/s].
 
-        It is also that in plane strain.
+        It is also that in plane strain, and infinite without mass.
         """
+        if self.rho == 0.0:
+            return math.inf
         return math.sqrt((self.lame_lambda + 2.0 * self.shear_modulus) / self.rho)
 
     @property
     def c_s(self) -> float:
-        """Return the shear wave speed sqrt(shear_modulus / rho) [m/s]."""
+        """Return the shear wave speed sqrt(shear_modulus / rho) [m/s], infinite without mass."""
+        if self.rho == 0.0:
+            return math.inf
         return math.sqrt(self.shear_modulus / self.rho)
 
 
@@ -230,7 +236,16 @@ class MassProportional:
         check_fields(self)
 
     def coefficients(self, material: LinearElastic) -> tuple[float, float]:
-        """Return (c / rho, 0), for the integral of c is c / rho times the consistent mass."""
+        """Return (c / rho, 0), for the integral of c is c / rho times the consistent mass.
+
+        Raises:
+            InputError: a material without mass, of which no multiple damps.
+        """
+        if isinstance(material.rho, int | float) and material.rho == 0.0:
+            raise InputError(
+                "MassProportional damps by the mass, and a material has rho = 0: give "
+                "Rayleigh(0.0, beta), or give it a density above zero"
+            )
         return self.c / material.rho, 0.0
 
 

@@ -135,7 +135,8 @@ def with_defaults(
 
     Without a scheme: the trapezoidal rule on redistributed mass; with an impact law, with mass at
     the contact nodes asked for, with a joint, or of a body that is not linear, the
-    Zienkiewicz-Wood-Taylor step at phi = ½, which never gains energy of a linear body;
+    Zienkiewicz-Wood-Taylor step at phi = ½, which never gains energy of a linear body. So have
+    bodies without mass;
     EnergyMomentum of a body that turns. Without a mass: the scheme's, and the consistent one of a
     body that is not linear.
 
@@ -152,6 +153,7 @@ def with_defaults(
         scheme = EnergyMomentum()
     if scheme is None:
         massive = isinstance(problem.mass, ConsistentMass) or problem.joint is not None
+        massive = massive or problem.system.has_massless_bodies
         if problem.impact is None and not (curved or massive):
             scheme = Trapezoidal()
         else:

@@ -17,7 +17,9 @@ import logging
 from collections.abc import Callable, Mapping
 from typing import ClassVar
 
-from ..core.algebra import Array, Mask
+import numpy as np
+
+from ..core.algebra import Array, Mask, max_abs
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.protocols import MassLaw
@@ -26,13 +28,19 @@ from ..core.step import Balance, State
 from ..laws.mass import ConsistentMass, Redistributed
 
 log = logging.getLogger(__name__)
+ROUGH = 0.01  # of the largest force: what may be missing in the equilibrium of massless bodies
 
 
 class SingleStep:
     """Share what one-step schemes have in common: they carry nothing but u and v.
 
     They start by themselves, and velocity jumps do not disturb them.
+
+    Attributes:
+        takes_massless_bodies: whether bodies without mass may be part of the problem.
     """
+
+    takes_massless_bodies: ClassVar[bool] = False
 
     @property
     def mass(self) -> MassLaw:
@@ -40,7 +48,13 @@ class SingleStep:
         return ConsistentMass()
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for unknowns without mass, whose forces would swing for ever."""
+        """Raise InputError for unknowns without mass, whose forces would swing for ever.
+
+        Bodies without mass pass where the scheme ``takes_massless_bodies``.
+        """
+        if self.takes_massless_bodies and problem.system.has_massless_bodies:
+            _check_massless_bodies(problem)
+            return
         _refuse_massless_elsewhere(problem)
         if problem.equations.massless is not None:
             raise InputError(
@@ -52,11 +66,15 @@ class SingleStep:
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
         """Return the state as it is: there is nothing to prepare.
 
+        Warn where bodies without mass are not at rest in it.
+
         Args:
-            problem: the problem that is marched; not read.
+            problem: the problem that is marched.
             state: the state to go on from.
             dt: size of the next steps [s]; not read.
         """
+        if problem.system.has_massless_bodies:
+            _warn_of_rough_start(problem, state)
         return state
 
     def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
@@ -234,6 +252,11 @@ def check_balance(name: str, problem: ContactProblem) -> None:
 
 def _refuse_massless_elsewhere(problem: ContactProblem) -> None:
     """Raise InputError for unknowns without mass beside contact nodes with mass."""
+    if problem.system.has_massless_bodies:
+        raise InputError(
+            "a material has rho = 0, and this scheme needs mass in all bodies: take "
+            "ZienkiewiczWoodTaylor() or Midpoint(), or give a density above zero"
+        )
     layer = problem.equations.massless
     surface = problem.surface
     if layer is not None and surface.some(~layer[surface.touched()]):
@@ -241,4 +264,48 @@ def _refuse_massless_elsewhere(problem: ContactProblem) -> None:
             "rows of M are zero while contact nodes have mass: condense these unknowns out of K "
             "(it is exact, as for rotations of a lumped beam), give them mass, or use "
             "mass=Redistributed()"
+        )
+
+
+def _check_massless_bodies(problem: ContactProblem) -> None:
+    """Raise InputError for what does not go with bodies without mass. Collective."""
+    if not isinstance(problem.mass, ConsistentMass):
+        raise InputError(
+            f"a material has rho = 0, and {problem.mass} hands mass from contact nodes to others: "
+            "give the problem mass=ConsistentMass()"
+        )
+    if problem.impact is not None:
+        raise InputError(
+            f"a material has rho = 0, and the impact law {problem.impact} needs mass at contact "
+            "nodes: leave the law out, or give a density above zero"
+        )
+    if problem.equations.internal is not None:
+        raise InputError(
+            "a material has rho = 0 beside bodies that are not linear: give a density above zero"
+        )
+
+
+def _warn_of_rough_start(problem: ContactProblem, state: State) -> None:
+    """Warn where bodies without mass are far from equilibrium off the contact. Collective.
+
+    Their unknowns follow from C v + K u = f at a time inside each step. Without damping, what is
+    missing in it at the start comes back with the other sign after every step.
+
+    Args:
+        problem: the problem that is marched.
+        state: the state to go on from.
+    """
+    system = problem.equations
+    inner = np.zeros(system.rows, dtype=bool) if system.massless is None else system.massless.copy()
+    inner[problem.surface.touched(frictional=True)] = False
+    load = system.load(state.t)
+    force = system.internal_force(state.u)
+    if system.C is not None:
+        force = force + system.C @ state.v
+    sizes = [max_abs((load - force)[..., inner]), max_abs(load), max_abs(force)]
+    missing, *forces = system.algebra.comm.max(np.array(sizes))
+    if missing > ROUGH * max(forces) and system.algebra.comm.rank == 0:
+        log.warning(
+            "bodies without mass (rho = 0) are not in equilibrium at the start, and would swing "
+            "about it: give a static stage before, or damping by stiffness"
         )

@@ -222,3 +222,27 @@ def replace_massless(problem: ContactProblem, x: Array, values: Array | float) -
     """
     massless = problem.equations.massless
     return x if massless is None else np.where(massless, values, x)
+
+
+def replace_in_bodies(problem: ContactProblem, v: Array, values: Array) -> Array:
+    """Return velocities with other values on nodes of bodies without mass.
+
+    No momentum changes by it. Contact unknowns are those of one side relative to the other one:
+    v of the bodies is R v, and what moves relative to a node without mass changes with it.
+
+    Args:
+        problem: the problem that is marched.
+        v: velocity [m/s] (n,), or rows (k, n).
+        values: those of nodes without mass, of the shape of v.
+    """
+    massless = problem.system.massless
+    if massless is None or not problem.system.has_massless_bodies:
+        return v
+    if v.ndim > 1:
+        pairs = zip(v, values, strict=True)
+        return np.stack([replace_in_bodies(problem, *pair) for pair in pairs])
+    R = problem.surface.coupling
+    if R is None:
+        return np.where(massless, values, v)
+    of_bodies = np.where(massless, R @ values, R @ v)
+    return np.asarray(2.0 * of_bodies - R @ of_bodies)  # R⁻¹ = 2 - R

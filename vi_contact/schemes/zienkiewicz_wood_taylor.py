@@ -25,6 +25,7 @@ from ..core.quantities import Between
 from ..core.stage import Affine, Answer, Stage
 from ..core.step import State
 from .base import SingleStep, end_state, position_stage
+from .consistent_data import replace_in_bodies
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,7 @@ class ZienkiewiczWoodTaylor(SingleStep):
     by_rows: ClassVar[bool] = True
     takes_joints: ClassVar[bool] = True
     takes_ends: ClassVar[bool] = True
+    takes_massless_bodies: ClassVar[bool] = True
 
     phi: Annotated[
         float, Between(0.5, 1.0, remedy="give a weight from 0.5 to 1, less is unstable")
@@ -85,12 +87,16 @@ class ZienkiewiczWoodTaylor(SingleStep):
     ) -> State:
         """Return the state with v1 = v0 + d/(phi dt).
 
+        Unknowns without mass get the mean velocity of the step, v0 + d/dt: no equation reads the
+        other, which would swing.
+
         Args:
-            problem: the problem that is marched; not read.
+            problem: the problem that is marched.
             state: the state at t0.
             stage: what ``stage`` returned for it.
             answer: x = u1 (n,) [m], and the mean reactions [N].
             dt: size of the step [s].
         """
         v = state.v + answer.d / (self.phi * dt)
+        v = replace_in_bodies(problem, v, state.v + answer.d / dt)
         return end_state(stage, answer, answer.x, v)

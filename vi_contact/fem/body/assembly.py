@@ -23,7 +23,7 @@ import numpy as np
 import ufl
 from dolfinx.mesh import Mesh
 
-from ...core.algebra import Array, Mask, from_each
+from ...core.algebra import Array, Mask, Matrix, from_each, largest
 from ...core.checks import instance
 from ...core.collective import Parts, agree
 from ...core.errors import InputError
@@ -47,8 +47,10 @@ from .assembly_checks import (
     check_initial,
     check_nodes,
     check_ratios,
+    has_no_mass,
     refuse_folded,
     refuse_in_yielding,
+    refuse_without_mass,
 )
 from .conditions import Conditions, as_tuple, gather_conditions
 from .dashpots import DashpotMatrix, Dashpots, describe_boundaries
@@ -234,6 +236,7 @@ def assemble(
         refuse_in_yielding(forms, conditions.loads)
     if any(isinstance(given, TURNING) for _, given in materials):
         refuse_beside_turning(conditions.dashpots, conditions.loads)
+    refuse_without_mass([given for _, given in materials], forms, conditions.dashpots)
     make_body = _choose_forms(forms, materials, integration=integration, stress=initial_stress)
     body = make_body(space, materials=materials, section=section, damping=damping)
     body.boundaries = conditions.dashpots
@@ -262,6 +265,7 @@ def assemble(
         water=_weigh_water(space, reservoir, section.thickness),
     )
     M = reduced.M
+    massless = _find_massless(comm, materials, M, rigid)
     base_mass = None
     if reduced.momenta is not None:
         base_mass = reduced.momenta - np.column_stack([M @ r for r in rigid.T])
@@ -279,6 +283,8 @@ def assemble(
         space=space,
         floating=floats(Unheld(algebra, M, reduced.K, rigid, space.bodies, space.coordinates)),
         tied=space.tied_unknowns,
+        massless=massless,
+        has_massless_bodies=massless is not None,
         absolute=any(boundary.lets_waves_in for boundary in conditions.dashpots),
         notes=describe_boundaries(conditions.dashpots, comm.rank, notes),
         companions=companions,
@@ -291,6 +297,21 @@ def assemble(
     del absorbers, reduced
     give_back(mesh.comm)
     return system
+
+
+def _find_massless(comm: Any, materials: Any, M: Matrix, rigid: Array) -> Mask | None:
+    """Return which unknowns (n,) have no mass, None without materials of density 0. Collective.
+
+    Args:
+        comm: the ranks.
+        materials: (cells, material) pairs.
+        M: the mass of the free unknowns.
+        rigid: (n, d) their translations: unknowns of water have none, and are left out.
+    """
+    if not any(has_no_mass(given) for _, given in materials):
+        return None
+    massless = np.asarray((M.diagonal() == 0.0) & rigid.any(axis=1))
+    return massless if largest(comm, massless.any()) else None
 
 
 def _number_unknowns(
@@ -409,7 +430,7 @@ def _gather_companions(
             "linear: give 'incompressible' or 'added mass'"
         )
     companions = [companion for part in (*prescribed, *acting) for companion in part.companions]
-    if companions and body.internal is not None:
+    if companions and body.internal is not None and not body.takes_companions:
         raise InputError(
             f"{body.nonlinear} does not go with motions that are marched beside the run, such as "
             "a free field, as these are linear: take fem.Dashpots there"

@@ -420,3 +420,36 @@ def _read_pair(name: str, pair: Any, remedy: str) -> tuple[Any, Any]:
     if len(members) != 2:
         raise InputError(f"{OWNER}: a pair of {name} has {len(members)} members; {remedy}")
     return members[0], members[1]
+
+
+def has_no_mass(material: Any) -> bool:
+    """Return whether a material has the density 0, which LinearElastic alone may have."""
+    return isinstance(material, LinearElastic) and material.rho == 0.0
+
+
+def refuse_without_mass(materials: Sequence[Any], forms: Any, dashpots: Sequence[Any]) -> None:
+    """Raise InputError for what does not go with a material of density 0.
+
+    Args:
+        materials: all of the body.
+        forms: the user's own weak forms, or None.
+        dashpots: absorbing boundaries, which may have materials of their own.
+    """
+    own = [boundary.material for boundary in dashpots if hasattr(boundary, "material")]
+    if not any(has_no_mass(given) for given in (*materials, *own)):
+        return
+    if dashpots:
+        raise InputError(
+            f"{OWNER}: a material has rho = 0, and dashpots absorb nothing without mass: hold its "
+            "outer sides and leave dashpots and free fields out, or give a density above zero"
+        )
+    if forms is not None:
+        raise InputError(
+            f"{OWNER}: a material has rho = 0 beside forms, which take their density from it: give "
+            "a density above zero"
+        )
+    if all(has_no_mass(given) for given in materials):
+        raise InputError(
+            f"{OWNER}: all materials have rho = 0, and nothing would move: give one of them a "
+            "density above zero"
+        )

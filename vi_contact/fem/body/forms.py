@@ -58,6 +58,8 @@ class ElasticForms:
         integration: the word of ``fem.assemble``.
         own_damping: whether the user gave a form of C.
         nonlinear: what is not linear, in words.
+        takes_companions: whether motions may be marched beside a body that is not linear; they are
+            asked to be beside its linear cells.
     """
 
     boundaries: tuple[Dashpots, ...] = ()  # of the same system
@@ -69,6 +71,7 @@ class ElasticForms:
     symmetric = True
     own_damping = False
     statics_only = False
+    takes_companions = False
     nonlinear = "Forms: internal"  # what is not linear, in words, where ``internal`` is there
     notes: tuple[str, ...] = ()
 

@@ -35,6 +35,7 @@ class YieldingForms(ElasticForms):
     """Hold the matrices and the internal force of one body that yields."""
 
     tells_stress = False
+    takes_companions = True
     nonlinear = "a material that yields"
 
     def __init__(

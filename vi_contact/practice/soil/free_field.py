@@ -9,7 +9,7 @@ ground far away,
 v_ff, and it is as if there were no side. Here this is exact to round-off, since the column has the
 heights and the materials of the side's own elements and is marched with the run's scheme. Waves
 that a structure sends out leave through the dashpots. No static load is held: for a gravity stage
-put the sides on rollers, then ``release`` them.
+put the sides on rollers, then ``release`` them. A body may yield inside, but not along the side.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.algebra import Array, total
+from ...core.algebra import Array, Indices, total
 from ...core.checks import provides
 from ...core.errors import InputError
 from ...core.problem import ContactProblem
@@ -28,6 +28,7 @@ from ...fem.body.dashpots import BoundaryLoads, CompliantBase, DashpotMatrix, Da
 from ...fem.body.space import FemSpace
 from ...fem.matrices.petsc_algebra import PetscMatrix
 from ...laws.materials import Section
+from ...laws.yielding import YieldingMaterial
 from .companion import CompanionRun
 from .moving_base import BaseMotion, GroundFrame
 from .soil_column import SoilColumn
@@ -204,6 +205,7 @@ def _make_column(space: FemSpace, forms: Any, side: FreeField) -> tuple[SoilColu
     nodes_of_cells = compat.geometry_dofmap(mesh)
     middles = np.array([mesh.geometry.x[nodes_of_cells[cell], 0].mean() for cell in cells])
     _refuse_unlike(forms, name)
+    _refuse_yielding(space, forms, cells, name)
     values = [forms.cellwise(key)[cells] for key in ("lame", "shear", "rho", "alpha_rho", "beta")]
     low = ends[:, :, 1].min(axis=1)
     high = ends[:, :, 1].max(axis=1)
@@ -241,3 +243,23 @@ def _refuse_unlike(forms: Any, name: str) -> None:
     raise InputError(
         f"free-field side '{name}': its column is {limit}: put Dashpots(…, material=) there"
     )
+
+
+def _refuse_yielding(space: FemSpace, forms: Any, cells: Indices, name: str) -> None:
+    """Raise InputError where a cell at the side may yield, as the column does not. Collective.
+
+    Args:
+        space: of the body.
+        forms: of the body, with its materials.
+        cells: (k,) local cells at the facets of the side that this rank owns.
+        name: of the side.
+    """
+    if forms.internal is None:
+        return
+    for where, given in forms.given_materials:
+        beside = float(np.isin(cells, where).sum())
+        if isinstance(given, YieldingMaterial) and total(space.comm, beside):
+            raise InputError(
+                f"free-field side '{name}' stands beside cells of {type(given).__name__}, and its "
+                "soil column is linear: put a LinearElastic along the side, or Dashpots there"
+            )

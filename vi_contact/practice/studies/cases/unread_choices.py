@@ -87,6 +87,7 @@ def find_unread(path: Path, tables: Mapping[str, Any], parts: Sequence[Part]) ->
     for part in parts:
         yield from _find_vain_ratios(part)
         yield from _find_vain_contact_laws(part)
+        yield from _find_vain_water(part)
         yield from _find_vain_solvers(part)
         yield from _find_doubles(part)
         yield from _find_vain_recorders(part)
@@ -270,6 +271,32 @@ def _find_friction(part: Part) -> str:
         return "Coulomb"
     laws = [call.callee.name for call in part.list_calls("friction")]
     return next((law for law in laws if law != "Frictionless"), "")
+
+
+def _find_vain_water(part: Part) -> Iterator[Finding]:
+    """Yield the efficiency of drains that are not there, and numbers of silt without silt."""
+    for call in part.list_calls("contact"):
+        for node in walk_nodes(call):
+            is_water = isinstance(node, Call) and node.callee.name == "JointWater"
+            if is_water and "efficiency" in node.arguments and "drain" not in node.arguments:
+                yield (
+                    "contact",
+                    (
+                        f"{part.label}: [contact.joint.water] efficiency is of drains, and there "
+                        "are none: give drain, their distance from the heel, or leave efficiency "
+                        "out"
+                    ),
+                )
+    for call in part.list_calls("reservoir"):
+        for name in ("silt_weight", "silt_ratio"):
+            if name in call.arguments and "silt" not in call.arguments:
+                yield (
+                    "reservoir",
+                    (
+                        f"{part.label}: [reservoir] {name} is of silt, and there is none: give "
+                        f"silt, the height of its top, or leave {name} out"
+                    ),
+                )
 
 
 def _find_vain_solvers(part: Part) -> Iterator[Finding]:

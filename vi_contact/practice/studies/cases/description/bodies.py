@@ -102,9 +102,18 @@ def _describe_body(
     masses = sizes[owned] * density
     mass = total(space.comm, masses.sum())
     first = space.comm.sum(masses @ centroids[owned])
+    volume = total(space.comm, sizes[owned].sum())
+    volume_centre = space.comm.sum(sizes[owned] @ centroids[owned]) / volume
     corners = space.mesh.geometry.x[compat.geometry_dofmap(space.mesh)[owned]]
     points = corners.reshape(-1, 3)[:, : space.dimension]
     shear = _find_slowest_shear(space, material, density, shear)
+
+    # a body without mass is damped by its stiffness alone, and has no waves
+    heavy = np.where(density > 0.0, density, 1.0)
+    waves = {}
+    if mass > 0.0:
+        waves["c_s"] = -largest(space.comm, np.max(-np.sqrt(shear / heavy), initial=-np.inf))
+        waves["h"] = largest(space.comm, longest_edge(space.mesh, owned)) / space.degree
 
     numbers = {
         key: value for key, value in vars(material).items() if isinstance(value, int | float)
@@ -117,16 +126,15 @@ def _describe_body(
         "name": name_body(space, tags, cells),
         "cells": round(total(space.comm, len(owned))),
         "mass": mass,
-        "size": total(space.comm, sizes[owned].sum()),
-        "centre": (first / mass).tolist(),
+        "size": volume,
+        "centre": (first / mass if mass > 0.0 else volume_centre).tolist(),
         "box": find_box(space.comm, points),
         "material": {"type": _name_law(material)} | numbers,
         "shear_modulus": _find_range(space.comm, shear / thickness),
         "density": _find_range(space.comm, density / thickness),
-        "alpha": _find_range(space.comm, inertial / density),
+        "alpha": _find_range(space.comm, inertial / heavy),
         "beta": _find_range(space.comm, space.forms.cellwise("beta")[owned]),
-        "c_s": -largest(space.comm, np.max(-np.sqrt(shear / density), initial=-np.inf)),
-        "h": largest(space.comm, longest_edge(space.mesh, owned)) / space.degree,
+        **waves,
     }
 
 

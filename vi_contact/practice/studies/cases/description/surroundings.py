@@ -62,6 +62,8 @@ def describe_sides(model: Mapping[str, Any]) -> dict[str, Any]:
     edges = {"min": low, "max": high}
     width = max(high[axis] - low[axis] for axis, _ in sides if axis != vertical)
     waves = [wave for wave in model["waves"] if wave["body"] in around]
+    if not waves:  # a ground without mass sends nothing back
+        return {}
     slowest = min(waves, key=lambda wave: float(wave["c_s"]))
     periods = [record["mean_period"] for record in model["records"] if record["mean_period"]]
     length = slowest["c_s"] * max(periods) if periods else None
