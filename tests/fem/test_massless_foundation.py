@@ -12,7 +12,7 @@ import pytest
 from mpi4py import MPI
 
 import vi_contact as vc
-from vi_contact import fem, laws
+from vi_contact import bem, fem, ground_motion, laws, soil
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
@@ -208,3 +208,21 @@ def test_many_runs_are_single_runs() -> None:
     runs = [{"problem": one, **settings} for one in problems]
     for number, run in vc.simulate_many(runs):
         assert max(distance(march(problems[number], 20), run).values()) < 1e-10
+
+
+@pytest.mark.serial
+def test_waves_without_mass_are_refused() -> None:
+    """Speeds would be infinite: boundary elements and columns of soil say so."""
+    stone = vc.LinearElastic(E=1e9, nu=0.2, rho=0.0)
+    sand = vc.LinearElastic(E=1e8, nu=0.3, rho=1900.0)
+    curves = soil.SoilCurves.seed_idriss()
+    record = ground_motion.Record(np.ones(50), 0.01)
+    square = bem.polygon([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], 2)
+    calls: list[Any] = [
+        lambda: soil.equivalent_linear([(5.0, stone, curves)], record, rock=sand),
+        lambda: soil.equivalent_linear([(5.0, sand, curves)], record, rock=stone),
+        lambda: bem.energetic_blocks(square, stone, dt=1e-4, steps=2),
+    ]
+    for call in calls:
+        with pytest.raises(InputError, match="has rho = 0, and no wave runs without mass"):
+            call()

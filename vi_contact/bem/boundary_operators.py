@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from ..core.algebra import Array
 from ..core.checks import instance, number
 from ..core.errors import InputError
-from ..laws.materials import LinearElastic
+from ..laws.materials import LinearElastic, require_mass
 from .boundary_mesh import BoundaryMesh
 from .element_pairs import ElementPairs
 from .fundamental_solution import KernelSet
@@ -50,6 +50,7 @@ def check_body(mesh: BoundaryMesh, material: LinearElastic, orders: Orders) -> N
     instance(owner, "the mesh", mesh, BoundaryMesh, "give a BoundaryMesh, for example polygon(...)")
     instance(owner, "the material", material, LinearElastic, "give a LinearElastic")
     instance(owner, "orders", orders, Orders, "give numbers of points, Orders()")
+    require_mass(owner, "the material", material)
     if material.xi:
         raise InputError(
             f"{owner}: the material has the damping ratio xi = {material.xi:g}, and they are "

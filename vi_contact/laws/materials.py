@@ -125,6 +125,20 @@ class LinearElastic:
         return math.sqrt(self.shear_modulus / self.rho)
 
 
+def require_mass(owner: str, name: str, material: LinearElastic) -> None:
+    """Raise InputError for a material without mass, where waves are computed.
+
+    Args:
+        owner: the function, in its own words.
+        name: of the material, in words.
+        material: the material.
+    """
+    if material.rho == 0.0:
+        raise InputError(
+            f"{owner}: {name} has rho = 0, and no wave runs without mass: give a density above zero"
+        )
+
+
 @dataclass(frozen=True)
 class ElasticValues:
     """Hold elastic constants at points, which sections and damping take as they take a material.

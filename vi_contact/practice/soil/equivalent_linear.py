@@ -25,7 +25,7 @@ from ...core.arguments import check_arguments
 from ...core.checks import instance, number, optional, quote, refuse, several, whole
 from ...core.errors import InputError, ViContactError
 from ...core.quantities import Positive, Unit
-from ...laws.materials import LinearElastic
+from ...laws.materials import LinearElastic, require_mass
 from ..ground_motion.record import Record
 from .curves import SoilCurves
 from .soil_column import SoilColumn
@@ -187,6 +187,7 @@ def _check_layers(owner: str, layers: Sequence[Layer]) -> tuple[Layer, ...]:
         number(owner, "the thickness [m]", thickness, positive=True)
         instance(owner, "the material", material, LinearElastic, remedy)
         instance(owner, "the curves", curves, SoilCurves, remedy)
+        require_mass(owner, "the material of a layer", material)
         if material.xi:
             raise InputError(
                 f"{owner}: the material of a layer has the damping ratio xi = {material.xi:g}, and "
@@ -204,6 +205,8 @@ def _check_rock(owner: str, rock: LinearElastic | None, rock_damping: float) -> 
             f"{owner}: rock_damping = {quote(rock_damping)} has no rock to damp; give rock too, or "
             "leave it out"
         )
+    if rock is not None:
+        require_mass(owner, "the rock", rock)
     if rock is not None and rock.xi:
         raise InputError(
             f"{owner}: the rock has the damping ratio xi = {rock.xi:g}, which is not read here; "
