@@ -29,7 +29,8 @@ from ..matrices.petsc_algebra import PetscAlgebra
 from ..mesh.communicators import MpiComm, keep_communicator
 from ..mesh.group_checks import cells_of
 from ..mesh.nodal_space import NodalSpace, bounding_box
-from ..mesh.numbering import NodeTable, facet_rows, find_outward, node_numbers
+from ..mesh.normals import outward_normals
+from ..mesh.numbering import NodeTable, facet_rows, node_numbers
 from ..mesh.tagged_mesh import Cells, Facets
 from .blending import Blends, TiedSide
 from .elimination import Elimination
@@ -301,7 +302,10 @@ class FemSpace(NodalSpace):
         """Return a tied boundary: its nodes on all ranks, by their numbers. Collective."""
         blocks = self.facet_blocks(facets.indices)
         rows = self.node_of_block[facet_rows(self.V, facets.indices)]
-        outward = find_outward(self.mesh, facets.indices)
+        vertices = compat.entities_to_geometry(
+            self.mesh, self.mesh.topology.dim - 1, facets.indices
+        )
+        outward = outward_normals(self.mesh, facets.indices, vertices)
         own = (self.nodes[blocks], self.points[blocks], self.held[blocks], rows, outward)
         parts = self.comm.bcast(self.comm.gather(own))
         numbers, points, held, rows, outward = (

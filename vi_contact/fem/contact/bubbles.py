@@ -26,10 +26,10 @@ from ...core.checks import describe_point, refuse
 from .. import compat
 from ..body.hierarchical import Hierarchy
 from ..body.space import FemSpace
+from ..mesh.normals import outward_normals
 from ..mesh.numbering import facet_rows
 from ..mesh.tagged_mesh import Facets
 from .conditions import Facing
-from .faces import outward_normals
 from .nodes import Nodes, Rows
 
 POINTS = 5  # of a rule in every direction: exact for degree 8 on flat facets

@@ -23,6 +23,7 @@ from ...core.surfaces import group_same_nodes
 from ...meshes.rows import number_alike, number_parts
 from .. import compat
 from ..body.space import FemSpace
+from ..mesh.normals import outward_normals
 from ..mesh.numbering import facet_rows, is_curved
 from ..mesh.tagged_mesh import Facets
 from .nodes import Nodes, gather_rows
@@ -183,25 +184,6 @@ def _bound_rows(nodes: Indices, low: Array, high: Array) -> tuple[Indices, Array
         np.minimum.reduceat(low[order], starts),
         np.maximum.reduceat(high[order], starts),
     )
-
-
-def outward_normals(mesh: Any, facets: Any, geometry: Any) -> Array:
-    """Return outward unit normals (k, d) of the planes of local facets.
-
-    Args:
-        mesh: the DOLFINx mesh.
-        facets: (k,) local numbers.
-        geometry: (k, v) local geometry nodes of their vertices.
-    """
-    d = mesh.geometry.dim
-    x = mesh.geometry.x[geometry][:, :, :d]
-    middle = x.mean(axis=1)
-    normals = np.linalg.svd(x - middle[:, None, :])[2][:, -1]  # along which the facet extends least
-    cell_of = mesh.topology.connectivity(mesh.topology.dim - 1, mesh.topology.dim)
-    cells = cell_of.array[cell_of.offsets[facets]]  # the first cell of each
-    inside = mesh.geometry.x[compat.geometry_dofmap(mesh)[cells]][:, :, :d].mean(axis=1)
-    inward = np.sum((middle - inside) * normals, axis=1)[:, None] < 0.0
-    return np.asarray(np.where(inward, -normals, normals))
 
 
 def _compute_curved_normals(space: FemSpace, facets: Any, plane: Array) -> Array:

@@ -15,10 +15,10 @@ from ...core.algebra import Array, Comm, Indices, Mask
 from ...core.corners import FEATURE_ANGLE
 from ...meshes.rows import number_alike
 from .. import compat
+from ..mesh.normals import outward_normals
 from ..mesh.numbering import node_numbers, number_bodies
 from ..mesh.tagged_mesh import local_count
 from .clipping import areas
-from .faces import outward_normals
 from .nodes import gather_rows
 
 ROUND_OFF = 64.0 * np.finfo(float).eps  # of the largest coordinate

@@ -243,25 +243,6 @@ def facet_rows(V: Any, facets: Any) -> Indices:
     return np.asarray(compat.cell_blocks(V)[cells[:, None], on[side]])
 
 
-def find_outward(mesh: Any, facets: Any) -> Array:
-    """Return the unit normals (k, d) of local facets that point away from their cells. Collective.
-
-    Those of curved facets, and of quadrilaterals that are not plane, are those of their vertices.
-    """
-    d = mesh.geometry.dim
-    tdim = mesh.topology.dim
-    corners = mesh.geometry.x[compat.entities_to_geometry(mesh, tdim - 1, facets)][..., :d]
-    mesh.topology.create_connectivity(tdim - 1, tdim)
-    beside = mesh.topology.connectivity(tdim - 1, tdim)
-    cells = beside.array[beside.offsets[:-1][facets]]
-    inside = mesh.geometry.x[compat.geometry_dofmap(mesh)[cells]][..., :d].mean(axis=1)
-    middles = corners.mean(axis=1)
-    # the direction in which the vertices extend least
-    normals = np.linalg.svd(corners - middles[:, None, :])[2][:, -1]
-    inward = np.sum(normals * (middles - inside), axis=1) < 0.0
-    return np.where(inward[:, None], -normals, normals)
-
-
 def _inside(around: list[list[int]], side: set[int]) -> list[int]:
     """Return the places of the nodes of a cell that lie between vertices of one side."""
     return [place for place, vertices in enumerate(around) if side.issuperset(vertices)]
