@@ -134,9 +134,8 @@ def with_defaults(
     """Return (the problem with a mass matrix, the scheme to run it with).
 
     Without a scheme: the trapezoidal rule on redistributed mass; with an impact law, with mass at
-    the contact nodes asked for, with a joint, or of a body that is not linear, the
-    Zienkiewicz-Wood-Taylor step at phi = ½, which never gains energy of a linear body. So have
-    bodies without mass;
+    the contact nodes asked for, with a joint, with bodies without mass, or of a body that is not
+    linear, the Zienkiewicz-Wood-Taylor step at phi = ½, which never gains energy of a linear body;
     EnergyMomentum of a body that turns. Without a mass: the scheme's, and the consistent one of a
     body that is not linear.
 
@@ -152,8 +151,11 @@ def with_defaults(
     if scheme is None and turns(problem.system.internal):
         scheme = EnergyMomentum()
     if scheme is None:
-        massive = isinstance(problem.mass, ConsistentMass) or problem.joint is not None
-        massive = massive or problem.system.has_massless_bodies
+        massive = (
+            isinstance(problem.mass, ConsistentMass)
+            or problem.joint is not None
+            or problem.system.has_massless_bodies
+        )
         if problem.impact is None and not (curved or massive):
             scheme = Trapezoidal()
         else:

@@ -178,8 +178,9 @@ def make_pair(
     directions = snap_to_axes(nodes.normals)
     gap = _measure_gap(space, side1.name, side2, nodes, directions, matched)
     P = matched.P
-    faced = np.flatnonzero(np.asarray(abs(P).max(axis=0).todense()).ravel() > ROUND_OFF)
-    refuse_followers(space, side2.name, side2.nodes.numbers[faced], side2.nodes.points[faced])
+    if len(space.mean_nodes):
+        faced = np.flatnonzero(np.asarray(abs(P).max(axis=0).todense()).ravel() > ROUND_OFF)
+        refuse_followers(space, side2.name, side2.nodes.numbers[faced], side2.nodes.points[faced])
     if len(space.tied_nodes):
         nodes, directions, shares = merge_tied(space, side1.name, nodes, directions, angle)
         gap = shares @ gap

@@ -74,10 +74,10 @@ def _as_side(side: TiedSide, tied: Indices | None = None) -> Side:
     if corners.shape[1] == 2:
         size = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
     else:
-        # a quadrilateral is a grid of two rows: half the product of its diagonals
-        ends = (1, 2) if side.vertices == 3 else (3, 0)
-        first = corners[:, ends[0]] - corners[:, 0 if side.vertices == 3 else ends[1]]
-        second = corners[:, 2] - corners[:, 0 if side.vertices == 3 else 1]
+        # half the product of two sides of a triangle, or of the diagonals of a quadrilateral, whose
+        # vertices are a grid of two rows
+        ends = ((1, 0), (2, 0)) if side.vertices == 3 else ((3, 0), (2, 1))
+        first, second = (corners[:, end] - corners[:, start] for end, start in ends)
         size = 0.5 * np.linalg.norm(np.cross(first, second), axis=1)
     sums = np.zeros_like(side.points)
     weights = np.zeros(len(sums))

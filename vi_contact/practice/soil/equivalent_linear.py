@@ -205,9 +205,10 @@ def _check_rock(owner: str, rock: LinearElastic | None, rock_damping: float) -> 
             f"{owner}: rock_damping = {quote(rock_damping)} has no rock to damp; give rock too, or "
             "leave it out"
         )
-    if rock is not None:
-        require_mass(owner, "the rock", rock)
-    if rock is not None and rock.xi:
+    if rock is None:
+        return
+    require_mass(owner, "the rock", rock)
+    if rock.xi:
         raise InputError(
             f"{owner}: the rock has the damping ratio xi = {rock.xi:g}, which is not read here; "
             "give rock_damping, and leave xi out"
