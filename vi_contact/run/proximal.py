@@ -21,6 +21,7 @@ problem all else is unique.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -51,7 +52,7 @@ MOST = 0.999  # the same: bodies that move most, but for rounding
 
 
 @dataclass(frozen=True)
-class _Motion:
+class Motion:
     """Hold one step of the iteration.
 
     Attributes:
@@ -70,18 +71,18 @@ class _Motion:
 
 
 @dataclass(frozen=True)
-class _Pass(Certified):
+class ProximalPass(Certified):
     """Hold the answer that a step has led to.
 
     Attributes:
         motion: the step.
     """
 
-    motion: _Motion
+    motion: Motion
 
 
 @dataclass(kw_only=True)
-class _Progress(Passes[_Pass]):
+class Progress(Passes[ProximalPass]):
     """Hold the best answer so far, by residual and by size of step.
 
     A smaller step counts near round-off: the residual of a stiff body is there long before soft
@@ -93,14 +94,14 @@ class _Progress(Passes[_Pass]):
 
     slowest: float = np.inf
 
-    def is_better(self, there: _Pass) -> bool:
+    def is_better(self, there: ProximalPass) -> bool:
         """Say whether an answer has a smaller residual or, near round-off, a smaller step."""
         is_slower = there.worst <= NEAR * self.tolerance and there.motion.pace < self.slowest
         return there.worst < self.least or is_slower
 
     gains = is_better
 
-    def take(self, there: _Pass) -> None:
+    def take(self, there: ProximalPass) -> None:
         """Take an answer into account."""
         super().take(there)
         self.slowest = min(there.motion.pace, self.slowest)
@@ -116,6 +117,7 @@ class Proximal:
 
     step: StepProblem
     motion: Array
+    strength: ClassVar[float] = 1.0  # of P, over ``make_body_springs``
 
     def __init__(
         self, problem: ContactProblem, K: EffectiveMatrix, solver: Solver, tolerance: float
@@ -137,7 +139,7 @@ class Proximal:
         self._bodies = RigidBodies(problem)
         self._weak = make_body_springs(problem)
         self._tolerance = tolerance
-        self._stiffen(1.0)
+        self._stiffen(self.strength)
 
     def _stiffen(self, factor: float) -> None:
         """Take P so many times as strong, and factorise."""
@@ -146,6 +148,10 @@ class Proximal:
         self._springs = self._weak if factor == 1.0 else algebra.combine([(factor, self._weak)])
         A = algebra.combine([(1.0, self._K.matrix), (factor, self._weak)])
         self._A = EffectiveMatrix(A, algebra, space=self._K.space, inertia=self._K.inertia)
+        self._prepare()
+
+    def _prepare(self) -> None:
+        """Prepare what solves the steps on these springs."""
         self._prepared = self._solver.prepare(self._A, self._surface, 1.0)
 
     def certificate(self, result: StepResult) -> Certificate:
@@ -166,7 +172,7 @@ class Proximal:
             StepFailure: no answer is certified.
         """
         self.step = step
-        progress = _Progress(tolerance=self._tolerance, goal=-np.inf, patience=2)
+        progress = Progress(tolerance=self._tolerance, goal=-np.inf, patience=2)
         answer = StepResult(step.guess, np.zeros(step.surface.count), step.active, 0, "")
         for _ in range(2):
             try:
@@ -180,6 +186,10 @@ class Proximal:
             self._stiffen(STIFFER)
             if progress.best is not None:
                 answer = replace(progress.best.result, iterations=0)
+        return self._judge(progress, why)
+
+    def _judge(self, progress: Progress, why: str) -> Certified:
+        """Return the best answer; StepFailure, with the reason why, if it has no certificate."""
         if progress.best is not None and progress.is_certified:
             return progress.best
         raise StepFailure(
@@ -188,7 +198,7 @@ class Proximal:
             "of the body"
         )
 
-    def _iterate(self, answer: StepResult, progress: _Progress) -> Iterator[_Pass]:
+    def _iterate(self, answer: StepResult, progress: Progress) -> Iterator[ProximalPass]:
         """Yield the answers of steps that begin from this one.
 
         Raises:
@@ -199,7 +209,7 @@ class Proximal:
         again = False  # whether this step repeats the one before, with a smaller share
         centre = answer.x  # from where d counts
         carried = np.zeros_like(centre)  # resultants that the step before left
-        old: _Motion | None = None
+        old: Motion | None = None
         while True:
             # One step: an ordinary problem for what the answer leaves over.
             inner = self._pose_next(answer, share, centre, carried)
@@ -207,7 +217,7 @@ class Proximal:
             result = add(self.step, answer, increment, share)
             new = self._measure_motion(result.x - centre, increment.active)
             self.motion = new.d
-            there = _Pass(result, self.certificate(result), False, new)
+            there = ProximalPass(result, self.certificate(result), False, new)
             worst = there.worst
             yield there
             if result.iterations > INNER:
@@ -273,18 +283,18 @@ class Proximal:
         )
         return replace(left, A=self._A, b=b)
 
-    def _measure_motion(self, d: Array, active: Mask) -> _Motion:
+    def _measure_motion(self, d: Array, active: Mask) -> Motion:
         """Return the step d (n,) [m] that ended with this contact set (m,). Collective."""
         pull = self._springs @ d
         pace = float(np.sqrt(max(self._system.algebra.dot(d, pull), 0.0)))
-        return _Motion(d, pull, pace, self.step.surface.normal_values(d), active)
+        return Motion(d, pull, pace, self.step.surface.normal_values(d), active)
 
-    def _find_closing(self, motion: _Motion) -> Mask:
+    def _find_closing(self, motion: Motion) -> Mask:
         """Return the contact points (m,) that come nearer to their obstacle. Collective."""
         size = largest(self.step.surface.comm, max_abs(motion.d))
         return np.asarray((motion.closing > STOPPED * size) & np.isfinite(self.step.bound))
 
-    def _refuse_flight(self, motion: _Motion, u: Array) -> None:
+    def _refuse_flight(self, motion: Motion, u: Array) -> None:
         """Raise NoEquilibrium for a rigid motion without end that loads drive. Collective.
 
         It bends nothing, dᵀKd = 0, the loads work on it, f·d > 0, and no contact stops it. Where
@@ -348,7 +358,7 @@ class Proximal:
         where = describe_point(np.array(place))
         return f" ({moving} of {count} bodies move, such as that at {where})"
 
-    def _look_ahead(self, old: _Motion, new: _Motion, result: StepResult) -> float:
+    def _look_ahead(self, old: Motion, new: Motion, result: StepResult) -> float:
         """Return how many times d to go further at once.
 
         It is the sum of the steps to come when each is ‖d_new‖/‖d_old‖ of the one before (Aitken),

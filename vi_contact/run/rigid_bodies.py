@@ -7,7 +7,10 @@ and K w = 0, a static stage asks for w·(f - B_nᵀ r_n - B_tᵀ r_t) = 0, the s
 moments. No stiffness enters it.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
+import scipy.sparse as sp
 
 from ..core.algebra import Array, Matrix, total
 from ..core.problem import ContactProblem
@@ -60,6 +63,58 @@ class RigidBodies:
         if self._coupling is None:
             return force
         return 2.0 * force - self._coupling.transpose_apply(force)
+
+
+@dataclass(frozen=True, eq=False)
+class SprungMotions:
+    """Hold the k rigid motions R of bodies that K does not resist, with springs P that do.
+
+    Attributes:
+        R: (n, k) rows of this rank.
+        pull: P R (n, k), the same.
+        S: RᵀP R (k, k), the same on every rank.
+    """
+
+    R: sp.csr_matrix
+    pull: sp.csr_matrix
+    S: sp.csr_matrix
+
+
+def find_sprung_motions(problem: ContactProblem, springs: Matrix) -> SprungMotions:
+    """Return the rigid motions of bodies with their springs. Collective.
+
+    Args:
+        problem: whose bodies have unknowns of their own (no ``coupling``).
+        springs: P, which no two bodies share.
+    """
+    comm = problem.surface.comm
+    bodies = list(free_motions(problem.turned))
+
+    # P is asked for the first motions of all bodies at once, then for the second ones.
+    width = max(body.motions.shape[1] for body in bodies)
+    together = np.zeros((springs.rows, width))
+    for body in bodies:
+        together[body.rows, : body.motions.shape[1]] = body.motions
+    pulls = np.column_stack([springs @ motions for motions in together.T])
+
+    rows, columns, motions, pulled, energies = [], [], [], [], []
+    k = 0
+    for body in bodies:
+        count = body.motions.shape[1]
+        own = pulls[body.rows, :count]
+        rows.append(np.repeat(body.rows, count))
+        columns.append(np.tile(np.arange(k, k + count), len(body.rows)))
+        motions.append(body.motions.ravel())
+        pulled.append(own.ravel())
+        energies.append(comm.sum(body.motions.T @ own))
+        k += count
+    places = (np.concatenate(rows), np.concatenate(columns))
+    shape = (springs.rows, k)
+    return SprungMotions(
+        R=sp.csr_matrix((np.concatenate(motions), places), shape=shape),
+        pull=sp.csr_matrix((np.concatenate(pulled), places), shape=shape),
+        S=sp.csr_matrix(sp.block_diag(energies)),
+    )
 
 
 def make_body_springs(problem: ContactProblem) -> Matrix:

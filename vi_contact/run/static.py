@@ -41,6 +41,7 @@ from .materials import certify_material, keep_material, remember_material
 from .method import check_methods
 from .proximal import Proximal
 from .settling import Settling
+from .weakening import Weakening, weakens
 
 log = logging.getLogger(__name__)
 OPEN = 0.05  # of the area that touches at the start: so much may be open at rest without a warning
@@ -143,7 +144,7 @@ class Equilibria:
 
     Where prescribed displacements hold every body, K is positive definite, and a stage is one step
     of the contract (``core.step``) with A = K. Where contact alone holds one, K is singular, and
-    the stage is a sequence of such steps (``proximal``). That of a body that is not linear is a
+    the stage is a sequence of such steps (``proximal``, of stones ``weakening``). That of a body that is not linear is a
     sequence of steps about where it is (``solvers.nonlinear``).
 
     Attributes:
@@ -171,7 +172,9 @@ class Equilibria:
         refuse_matrix(problem, self._K)
         given = (problem, self._K, 1.0, [solver], tolerance)
         self.solver: Proximal | Settling | CertifiedSolver | NonlinearSolver
-        if system.internal is None and system.floating:
+        if system.internal is None and system.floating and weakens(problem, solver):
+            self.solver = Weakening(problem, self._K, solver, tolerance)
+        elif system.internal is None and system.floating:
             self.solver = Proximal(problem, self._K, solver, tolerance)
         elif system.internal is None:
             self.solver = CertifiedSolver(*given, advice=ADVICE)
@@ -239,7 +242,10 @@ class Equilibria:
             refuse_nan(step, lambda: problem.static_load)
             if problem.joint is not None:
                 return self._solve_joint(step, old)
-            certified = self.solver.solve(step)
+            if isinstance(self.solver, Weakening):
+                certified = self.solver.solve(step, old)
+            else:
+                certified = self.solver.solve(step)
         return _stand_still(problem, old, t, certified.result, certified.certificate)
 
     def _solve_nonlinear(self, old: State, t: float) -> State:

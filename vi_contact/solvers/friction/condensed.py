@@ -27,6 +27,7 @@ from ...core.step import Answers, StepProblem, StepResult
 from ...core.surfaces import ContactSurface
 from ...kernels.bodies import CondensedBodies
 from ...kernels.condensation import Condensation
+from .floating import Border, FloatingNewton
 from .hyperstatic import Hyperstatic
 from .problem import FrictionMethod, FrictionResult
 from .rings import find_rings
@@ -51,6 +52,7 @@ class CondensedFriction:
         surface: ContactSurface,
         *,
         rates: RateIteration,
+        border: Border | None = None,
     ) -> None:
         """Prepare the method for the flexibility of the contact unknowns.
 
@@ -59,6 +61,8 @@ class CondensedFriction:
             condensed: A, condensed; its flexibility is changed.
             surface: the contact surface.
             rates: iteration for laws that depend on the slip rate.
+            border: of bodies that contact alone holds, with traces and a sparse flexibility; None
+                where rigid motions are no unknowns.
         """
         self._surface = surface
         self._rates = rates
@@ -89,15 +93,23 @@ class CondensedFriction:
                 (np.ones(len(rows)), (rows, np.arange(len(rows)))), shape=(d * len(soft), len(rows))
             )
             B = sp.csr_matrix(sp.hstack([surface.traces.every, lengths]))
+            given: dict[str, Any] = {
+                "rings": find_rings(B, condensed.movable, d),
+                "weights": surface.everywhere(surface.weights),
+                "movable": condensed.movable,
+            }
+            if border is not None:
+                self.small = FloatingNewton(
+                    method, self.delassus, bilateral, border=border, **given
+                )
+                return
             self.small = Hyperstatic(
                 method,
                 self.delassus,
                 bilateral,
-                rings=find_rings(B, condensed.movable, d),
-                weights=surface.everywhere(surface.weights),
-                movable=condensed.movable,
                 touched=self._find_touched(),
                 points=surface.everywhere(surface.points),
+                **given,
             )
 
     def _find_touched(self) -> sp.csr_matrix | None:
