@@ -161,13 +161,15 @@ def _left_out(item: pytest.Item) -> bool:
 
 def _covering(items: list[pytest.Item]) -> set[pytest.Item]:
     """Of every function one test: the first on two ranks, the last on three, where long ones are
-    left out too. On two also those functions are left out that three ranks run in the same suite.
-    Where ranks are in its name or that of its file, on two so many that each value of each
-    parameter occurs, and on three also what is long. All others run on one rank, where a law, a
-    scheme or a shape takes the path that it takes on several."""
+    left out too. Where ranks are in its name or that of its file, on two so many that each value
+    of each parameter occurs, and on three also what is long. In a suite on both, two ranks leave a
+    file to three but for its functions about ranks, and run all of one of which three run none:
+    what a file is about in parallel, its short functions and those about ranks show. All others
+    run on one rank, where a law, a scheme or a shape takes the path that it takes on several."""
     functions: dict[str, list[pytest.Item]] = {}
     for item in items:
         functions.setdefault(item.nodeid.split("[")[0], []).append(item)
+    left_to_three = _find_files_on_three(functions) if THREE_FOLLOW else set()
     kept: set[pytest.Item] = set()
     for name, ones in functions.items():
         if SIZE > 2:
@@ -175,14 +177,24 @@ def _covering(items: list[pytest.Item]) -> set[pytest.Item]:
                 kept.add(ones[-1])
         elif "ranks" in name:
             kept.update(_each_value(ones))
-        elif not (THREE_FOLLOW and _runs_on_three(ones[-1])):
+        elif ones[0].path not in left_to_three:
             kept.add(ones[0])
     return kept
 
 
-def _runs_on_three(item: pytest.Item) -> bool:
-    """Whether three ranks run this last test of its function, whose name does not speak of them."""
-    left_out = any(item.get_closest_marker(marker) for marker in (*NOT_ON_THREE, "long"))
+def _find_files_on_three(functions: dict[str, list[pytest.Item]]) -> set[Path]:
+    """Files of which three ranks run the last test of some function."""
+    return {
+        ones[-1].path
+        for name, ones in functions.items()
+        if _runs_on_three(ones[-1], about_ranks="ranks" in name)
+    }
+
+
+def _runs_on_three(item: pytest.Item, *, about_ranks: bool) -> bool:
+    """Whether three ranks run this last test of its function."""
+    markers = NOT_ON_THREE if about_ranks else (*NOT_ON_THREE, "long")
+    left_out = any(item.get_closest_marker(marker) for marker in markers)
     return not left_out and item.path.parent.name not in ABOVE
 
 

@@ -255,6 +255,7 @@ class StepResult:
         history: how the method converged, in a measure of its own.
         aim: the residual at which an iterative method stopped because it was told to, 0 for one
             that goes on to round-off.
+        corrects_slowly: whether to correct the answer takes as long as to find it.
 
     Of several runs at once, x, r_n, active and r_t have a row for each.
     """
@@ -267,6 +268,7 @@ class StepResult:
     r_t: Array | None = None
     history: tuple[float, ...] = ()
     aim: float = 0.0
+    corrects_slowly: bool = False
 
 
 @dataclass(frozen=True)

@@ -93,9 +93,12 @@ def _compute_factors(
     ramp = np.array([2.0 * zeta / omega**3 - time / omega**2, -ones / omega**2])
     of_one = constant - of_u * constant[0] - of_v * constant[1]
     of_ramp = ramp - of_u * ramp0[0] - of_v * ramp0[1]
+    # Of oscillators that hardly swing, the differences above keep few digits.
     small = omega * time < _SMALL
-    of_one = np.where(small, _sum_series(time, omega, zeta, 2), of_one)
-    of_slope = np.where(small, _sum_series(time, omega, zeta, 3), of_ramp) / length
+    if small.any():
+        of_one = np.where(small, _sum_series(time, omega, zeta, 2), of_one)
+        of_ramp = np.where(small, _sum_series(time, omega, zeta, 3), of_ramp)
+    of_slope = of_ramp / length
     return np.array([of_u, of_v, of_one - of_slope, of_slope])
 
 

@@ -132,6 +132,7 @@ class CondensedFriction:
             method=self._name,
             r_t=r[:, 1:].copy(),
             history=answer.history,
+            corrects_slowly=sp.issparse(self.delassus),
         )
 
     def reactions(

@@ -6,8 +6,9 @@ rows of the conditions whose state has changed. With E the unit vectors of these
     J = J₀ + E V,   J⁻¹ v = y - W (1 + V W)⁻¹ V y,   y = J₀⁻¹ v,   W = J₀⁻¹ E
 
 (Hager, SIAM Rev. 31, 1989, 221-239). Columns of W are kept as long as the factor, so that a row
-costs one solution when it first changes. GMRES around it (Saad and Schultz, SIAM J. Sci. Stat.
-Comput. 7, 1986) mends rounding. Where columns take too many operations the factor is made anew.
+costs one solution when it first changes. Where Newton's steps become small the digits of this are
+enough; where not, GMRES around it (Saad and Schultz, SIAM J. Sci. Stat. Comput. 7, 1986) mends
+rounding. Where columns take too many operations the factor is made anew.
 """
 
 from collections.abc import Callable
@@ -22,7 +23,7 @@ from ...core.algebra import Array, Indices
 from ..normal.lcp import EPS
 
 BASIS = 40  # iterations at most, after which the problem gets its own factor
-LEFT = 1e-6  # of the right side, that GMRES may leave: Newton's next problem mends it
+LEFT = 1e-3  # of the right side, that GMRES may leave: Newton's next problem mends it
 # CHOSEN: of the operations of a factor, that columns may take before it is made anew
 SHARE = 1.0
 
@@ -71,39 +72,65 @@ class KeptFactor:
         self._R = self._D = np.zeros(0)  # the same
         self._known = np.zeros(0, dtype=np.int64)  # conditions whose columns are there
         self._columns = np.zeros((0, 0))
+        self._last: tuple[Array, Callable[[Array], Array]] | None = None  # states, what solves
         self.factors = 0
         self.columns = 0
         self.iterations = 0
         self.operations = 0.0
 
-    def solve(self, J: Jacobian, right: Array, marks: Array) -> Array | None:
+    def solve(
+        self, J: Jacobian, right: Array, marks: Array, *, is_rough: bool = False
+    ) -> Array | None:
         """Return J⁻¹ right, nearly; None where J is singular.
 
         Args:
             J: the Jacobian.
             right: (n,).
             marks: (m, …) what tells the states of the m conditions apart.
+            is_rough: whether the digits of the factor are enough.
         """
         if not right.any():
             return np.zeros_like(right)
         if self._marks is not None:
-            changed = np.flatnonzero((marks != self._marks).any(axis=1))
-            mend = self._mend(J, changed)
+            mend = self._find_mended(J, marks)
             if mend is not None:
-                x, count, is_done = self._iterate(J, right, mend)
-                self.iterations += count
+                x, is_done = self._apply(J, right, mend, is_rough)
                 if is_done:
                     return x
         # A factor of its own, and where single precision has not the digits one in double.
         for precise in (False, True):
-            if not self._factorise(J, precise=precise):
+            if not self._factorise(J, marks, precise=precise):
                 return None
-            self._marks = marks
-            x, count, is_done = self._iterate(J, right, self._substitute)
-            self.iterations += count
+            x, is_done = self._apply(J, right, self._substitute, is_rough)
             if is_done:
                 break
         return x
+
+    def _apply(
+        self, J: Jacobian, right: Array, solve: Callable[[Array], Array], is_rough: bool
+    ) -> tuple[Array, bool]:
+        """Return J⁻¹ right by what nearly solves with J, and whether it has the digits."""
+        if is_rough:
+            x = solve(right)
+            return x, bool(np.isfinite(x).all())
+        x, count, is_done = self._iterate(J, right, solve)
+        self.iterations += count
+        return x, is_done
+
+    def _find_mended(self, J: Jacobian, marks: Array) -> Callable[[Array], Array] | None:
+        """Return what solves with J by the factor kept; None where its own factor costs less.
+
+        Newton's method ends with problems of one set of states, which share what was made for it.
+
+        Args:
+            J: the Jacobian.
+            marks: (m, …) its states.
+        """
+        if self._last is not None and np.array_equal(self._last[0], marks):
+            return self._last[1]
+        mended = self._mend(J, np.flatnonzero((marks != self._marks).any(axis=1)))
+        self._last = None if mended is None else (marks, mended)
+        return mended
 
     def _mend(self, J: Jacobian, changed: Indices) -> Callable[[Array], Array] | None:
         """Return what solves with J by the factor kept; None where a factor of its own costs less.
@@ -169,15 +196,18 @@ class KeptFactor:
         self.operations += self._factor.operations_of_solve * (v.size // len(v))
         return np.asarray(self._factor.solve(v))
 
-    def _factorise(self, J: Jacobian, *, precise: bool) -> bool:
+    def _factorise(self, J: Jacobian, marks: Array, *, precise: bool) -> bool:
         """Make the factor of J, in double precision or single, and say whether there is one."""
         self.factors += 1
         self.operations += self._factor.operations
-        self._marks = None
+        self._marks = self._last = None
         self._known = np.zeros(0, dtype=np.int64)
         self._columns = np.zeros((0, 0))
         self._R, self._D = J.R, J.D
-        return bool(self._factor.factorise(J.R, J.D, precise=precise))
+        if not self._factor.factorise(J.R, J.D, precise=precise):
+            return False
+        self._marks = marks
+        return True
 
     def _iterate(
         self, J: Jacobian, right: Array, solve: Callable[[Array], Array]

@@ -200,7 +200,7 @@ class SparseNewton:
                 seen[states.key] = seen.get(states.key, 0) + 1
                 if seen[states.key] > SEEN:
                     break
-            found = self._advance(step, states, r, center)
+            found = self._advance(step, states, r, center, is_rough=slow == 0)
             if found is None:
                 break
             r = found
@@ -229,7 +229,13 @@ class SparseNewton:
         return np.asarray(self._shift @ r.ravel()).reshape(r.shape)
 
     def _advance(
-        self, step: ScaledProblem, states: States, r: Array, center: Array
+        self,
+        step: ScaledProblem,
+        states: States,
+        r: Array,
+        center: Array,
+        *,
+        is_rough: bool,
     ) -> Array | None:
         """Return the next r (m, d): that of the linear problem of the states.
 
@@ -238,6 +244,7 @@ class SparseNewton:
             states: of the conditions.
             r: (m, d) reactions so far.
             center: (m, d) those from which the shift counts.
+            is_rough: whether the digits of the factor are enough.
         """
         # Reactions that the states tell are put on their values. What r then leaves of the rows is
         # that of the other rows alone.
@@ -248,7 +255,7 @@ class SparseNewton:
         left[~free] = 0.0
         J = Jacobian(self._shifted, R, D)
         marks = np.column_stack([states.closed, states.stick, states.direction])
-        dr = self.kept.solve(J, left.ravel(), marks)
+        dr = self.kept.solve(J, left.ravel(), marks, is_rough=is_rough)
         if dr is None or not np.isfinite(dr).all():
             return None
         return _put(states, r + dr.reshape(r.shape))
