@@ -144,8 +144,8 @@ class Equilibria:
 
     Where prescribed displacements hold every body, K is positive definite, and a stage is one step
     of the contract (``core.step``) with A = K. Where contact alone holds one, K is singular, and
-    the stage is a sequence of such steps (``proximal``, of stones ``weakening``). That of a body that is not linear is a
-    sequence of steps about where it is (``solvers.nonlinear``).
+    the stage is a sequence of such steps (``proximal``; of stones, ``weakening``). That of a body
+    that is not linear is a sequence of steps about where it is (``solvers.nonlinear``).
 
     Attributes:
         solver: of the stages.

@@ -1,11 +1,12 @@
 """Solve static stages of stones, with springs that weaken as their stage settles.
 
-Stones that contact alone holds come to rest by the proximal-point iteration (``proximal``), which is
-implicit Euler for the motion P du/dτ = f - K u - Bᵀr in a time τ that has no meaning: the weaker the
-springs, the longer the steps. Long steps come to rest at once from near by. From far away hundreds
-of joints change between open, stick and slip in one step, and Newton's iteration finds no end. So
-steps begin short, grow tenfold after each one that succeeds, and are made tenfold shorter where one
-fails (pseudo-transient continuation: Kelley and Keyes, SIAM J. Numer. Anal. 35, 1998, 508-523).
+Stones that contact alone holds come to rest by the proximal-point iteration (``proximal``), which
+is implicit Euler for the motion P du/dτ = f - K u - Bᵀr in a time τ that has no meaning: the weaker
+the springs, the longer the steps. Long steps come to rest at once from near by. From far away
+hundreds of joints change between open, stick and slip in one step, and Newton's iteration finds no
+end. So steps begin short, grow tenfold after each one that succeeds, and are made tenfold shorter
+where one fails (pseudo-transient continuation: Kelley and Keyes, SIAM J. Numer. Anal. 35, 1998,
+508-523).
 
 Each step takes the reactions of the one before as its start, and the first one those of the stage
 before. Where there is no equilibrium a long step is the mechanism itself, as what bends in it is
