@@ -34,7 +34,7 @@ from .hyperstatic import Hyperstatic
 from .linear import States
 from .problem import FrictionResult, ScaledProblem
 from .rings import Ring
-from .sparse import SparseDelassus, _pose, _put
+from .sparse import SparseDelassus, pose_by_states, put_by_states
 
 MOST_STEPS = 60  # of Newton
 GOAL = 1e-12  # of the residual without forces and motions: the iteration ends
@@ -192,8 +192,8 @@ class FloatingNewton(Hyperstatic):
             a: (k,) motions so far.
         """
         # Reactions that the states tell are put on their values, as ``sparse`` does.
-        r = _put(states, r)
-        R, D, free = _pose(states)
+        r = put_by_states(states, r)
+        R, D, free = pose_by_states(states)
         gaps = self._find_gaps(step, r, a)
         left = -np.einsum("ijk,ik->ij", R, gaps) - np.einsum("ijk,ik->ij", D, r - states.fixed)
         left[~free] = 0.0
@@ -215,4 +215,4 @@ class FloatingNewton(Hyperstatic):
         change += lu.solve(right - J @ change)
         if not np.isfinite(change).all():
             return None
-        return _put(states, r + change[: r.size].reshape(r.shape)), a + change[r.size :]
+        return put_by_states(states, r + change[: r.size].reshape(r.shape)), a + change[r.size :]

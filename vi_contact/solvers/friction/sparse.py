@@ -248,9 +248,9 @@ class SparseNewton:
         """
         # Reactions that the states tell are put on their values. What r then leaves of the rows is
         # that of the other rows alone.
-        r = _put(states, r)
+        r = put_by_states(states, r)
         w = step.w(r) + self._spread(r - center)
-        R, D, free = _pose(states)
+        R, D, free = pose_by_states(states)
         left = -np.einsum("ijk,ik->ij", R, w) - np.einsum("ijk,ik->ij", D, r - states.fixed)
         left[~free] = 0.0
         J = Jacobian(self._shifted, R, D)
@@ -258,10 +258,10 @@ class SparseNewton:
         dr = self.kept.solve(J, left.ravel(), marks, is_rough=is_rough)
         if dr is None or not np.isfinite(dr).all():
             return None
-        return _put(states, r + dr.reshape(r.shape))
+        return put_by_states(states, r + dr.reshape(r.shape))
 
 
-def _put(states: States, r: Array) -> Array:
+def put_by_states(states: States, r: Array) -> Array:
     """Return r (m, d) with open conditions free of forces, and friction of those that slip."""
     r_n = np.where(states.closed, r[:, 0], 0.0)
     across = np.zeros_like(r[:, 1:])
@@ -291,7 +291,7 @@ def _couple(shift: sp.csr_matrix, d: int) -> sp.csr_matrix:
     return sp.csr_matrix(pattern + sp.identity(m))
 
 
-def _pose(states: States) -> tuple[Array, Array, Mask]:
+def pose_by_states(states: States) -> tuple[Array, Array, Mask]:
     """Return blocks R, D (m, d, d) of  R w + D (r - fixed) = 0.
 
     With them comes which rows (m, d) are not those of the identity.
